@@ -32,7 +32,7 @@ test-fast: $(VENV)/test
 # all of these tests.
 test-kilted:
 	$(MAKE) test VENV=.venv-kilted ROS=kilted \
-		ARGS="$(or $(ARGS),tests/ros/test_compiled_backend.py tests/ros/test_backends.py tests/ros/test_policies.py tests/ros/test_node.py)"
+		ARGS="$(or $(ARGS),tests/ros/test_compiled_backend.py tests/ros/test_backends.py tests/ros/test_sets.py tests/ros/test_node.py)"
 
 # Builds docker/Dockerfile with a Docker engine of its own and tests the image; says so where there can be none.
 test-container: $(VENV)/test

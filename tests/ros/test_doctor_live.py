@@ -186,16 +186,6 @@ def test_nodes_of_another_user_are_told_from_nodes_that_are_not_there(stage: Sta
     assert nodes == {"a publisher whose node is not known yet"}
 
 
-def test_alone_on_a_domain_it_says_so_once(stage: Stage):
-    text = config({"front": group("/camera", "/lidar")})
-    code, problems, report, _ = examine(stage, text, until=lambda seen: codes(seen.problems) == ["alone"])
-    assert code == 1
-    assert codes(problems) == ["alone"]
-    assert f"{stage.domain}" in problems[0]["what"]
-    assert "LOCALHOST" in problems[0]["what"]
-    assert report["graph"]["n_topics"] == 0
-
-
 def test_without_a_file_it_says_who_is_there(stage: Stage):
     stage.player({"/camera": VECTOR}, node="usb_cam").is_up()
     for look_s in longer(3):
@@ -221,24 +211,6 @@ def test_simulated_time_is_no_fault_and_one_that_is_not_used_is_told(stage: Stag
     _, wall_problems, off_clock, _ = examine(stage, config(groups), until=all_arrives)
     assert (problems, wall_problems) == ([], [])
     assert "clock_unused" in codes(off_clock["diagnoses"])
-
-
-def test_simulated_time_without_a_clock_is_told(stage: Stage):
-    player = stage.player({"/camera": VECTOR, "/lidar": VECTOR})
-    player.is_up()
-    player.start(merged(now("/camera"), now("/lidar")), speed=1)
-    text = config({"front": {**group("/camera", "/lidar", policy="approximate_time"), "slop": "1s"}})
-    arguments = ["--ros-args", "-p", "use_sim_time:=true"]
-    _, problems, *_ = examine(stage, text, *arguments, until=lambda seen: codes(seen.problems) == ["no_clock"])
-    assert codes(problems) == ["no_clock"]
-
-
-def test_a_map_that_was_sent_once_is_no_fault_beside_latest_time(stage: Stage):
-    stage.player({"/map": VECTOR}, durability="transient_local").play(now("/map", behind_s=3, once=True))
-    stage.player({"/scan": VECTOR}, node="lidar").start(now("/scan"), speed=1)
-    text = config({"slam": {**group("/scan", "/map", policy="latest_time"), "trigger": "/scan"}})
-    _, problems, *_ = examine(stage, text, until=all_arrives)
-    assert problems == []
 
 
 def test_a_relay_of_the_same_name_is_seen_and_is_told_nothing_of_the_look(stage: Stage):

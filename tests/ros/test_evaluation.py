@@ -110,10 +110,17 @@ def test_a_report_stands_until_the_next_one_is_there(relay_of, monkeypatch):
     assert there == [3] * 3
 
 
-def test_a_group_that_cannot_be_evaluated_is_named_and_its_last_report_is_gone(relay_of, monkeypatch):
+def test_a_group_that_cannot_be_evaluated_is_named_and_its_last_report_is_gone(relay_of, monkeypatch, caplog):
     relay = relay_of(2)
     _evaluated_next(relay)
     assert relay.state().unjudged == ()
-    monkeypatch.setattr(relay.monitor, "_evaluate_group", lambda *_: dict[str, object]()["no such"])
-    relay.evaluate()
-    assert (relay.state().unjudged, _evaluated_at(relay)) == (("g0", "g1"), {})
+    evaluate = relay.monitor._evaluate_group  # noqa: SLF001  as above
+
+    def failing(binding, *of):
+        return evaluate(binding, *of) if binding.group.config.name == "g1" else dict[str, object]()["no rate"]
+
+    monkeypatch.setattr(relay.monitor, "_evaluate_group", failing)
+    for _ in range(2):
+        relay.evaluate()
+        assert (relay.state().unjudged, list(_evaluated_at(relay))) == (("g0",), ["g1"])
+    assert caplog.text.count("a bug in syncrelay while evaluating g0; the relay keeps running") == 1

@@ -12,10 +12,10 @@ from tests.ros.configs import config, inputs
 from tests.ros.domain import claimed_domain
 from tests.ros.frames import Frame
 from tests.ros.processes import Process, wait_until
-from tests.ros.sensors import APPROXIMATE, BY_RECEIPT, ON_AND_ON_MS, front, play, stream, wait_for_sets
+from tests.ros.sensors import APPROXIMATE, BY_RECEIPT, ON_AND_ON_MS, PAIR, front, play, stream, wait_for_sets
 from tests.ros.stage import Stage, running_stage
 from tests.ros.status import ANY_PORT, findings, first_group, get, page, status, wait_for_finding
-from tests.ros.streams import BEGIN, MS, merged
+from tests.ros.streams import BEGIN, MS, at, merged
 
 pytestmark = pytest.mark.ros
 
@@ -83,6 +83,27 @@ def test_what_the_graph_shows_is_found_and_named(relay: Process, name: str):
     _, code, named = BROKEN[name]
     wait_for_finding(relay, code, name, naming=named)
     relay.wait_for_log(f"{name}: ")
+
+
+def test_what_is_absent_is_named_once_and_the_group_runs_when_it_comes_beside_a_stranger(stage: Stage):
+    relay = stage.relay(config({"front": {"policy": "exact_time", "topics": inputs(PAIR)}}))
+    camera = stage.player({"/camera": VECTOR})
+    stage.player({"/camera": IMAGE}, node="stranger")
+    camera.match()
+    relay.wait_for_log("front: waiting for a publisher of /lidar")
+    # A message that comes and goes while another is missing is no reason to say it again.
+    camera.play(at("/camera", *range(0, 3000, 100)), speed=1)
+    stage.player({"/lidar": VECTOR}).match()
+    relay.wait_for_log("front: running")
+    relay.wait_for_log(f"/camera: /stranger publishes it as {IMAGE}, the file says {VECTOR}")
+    relay.send(signal.SIGTERM)
+    assert relay.wait() == 0
+    assert relay.stderr.count("front: waiting for a publisher of /lidar") == 1
+
+
+def test_a_type_that_is_not_installed_is_logged_once(relay: Process):
+    wait_for_finding(relay, "type_not_importable", "not_installed")
+    assert relay.stderr.count("[syncrelay]: /not_installed/camera: fancy_msgs/msg/Fancy cannot be imported") == 1
 
 
 def test_a_group_that_gets_nothing_is_stale(relay: Process):
