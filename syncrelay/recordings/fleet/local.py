@@ -4,16 +4,18 @@ All modules are imported before the fork. A process ends with its recording: tha
 kills it because memory runs out, the other recordings are not affected.
 """
 
+import multiprocessing
 import os
-import pickle
 import resource
-import select
 import signal
 import warnings
 from collections.abc import Generator, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import ForkProcess
 from pathlib import Path
-from typing import Final, NoReturn
+from typing import Final
 
 from syncrelay.recordings.bag.definitions import jazzy_definition
 from syncrelay.recordings.fleet.job import TICK_S, TRIES, Failed, Finished, Job, Outcome, given_up, took_too_long
@@ -27,12 +29,12 @@ _STOPS: Final = frozenset({signal.SIGINT, signal.SIGTERM})
 
 @dataclass(frozen=True, slots=True)
 class _Worker:
-    """A process that tries a job for the nth time, and the file in memory that it writes the outcome to."""
+    """A process that tries a job for the nth time, and what its outcome is read from."""
 
     job: Job
     attempt: int
-    pid: int
-    outcome: int
+    process: ForkProcess
+    outcome: Connection
 
 
 class LocalEngine:
@@ -48,17 +50,14 @@ class LocalEngine:
         # ROS types are loaded at their first use, which takes longer than a short recording: once here, for all.
         jazzy_definition("std_msgs/msg/Header")
         waiting = iter(jobs)
-        running: dict[int, _Worker] = {}
-        ended = select.poll()
+        running: dict[object, _Worker] = {}
 
         def begin(job: Job, attempt: int) -> None:
             # A signal between the fork and the entry in `running` would leave a worker that nobody ends.
             former = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPS)
             try:
                 worker = self._fork(job, attempt)
-                number = os.pidfd_open(worker.pid)
-                running[number] = worker
-                ended.register(number, select.POLLIN)
+                running[worker.outcome] = worker
             finally:
                 signal.pthread_sigmask(signal.SIG_SETMASK, former)
 
@@ -68,36 +67,32 @@ class LocalEngine:
                     begin(job, 1)
                 if not running:
                     return
-                found = ended.poll(TICK_S * 1000)
-                for number, _ in found:
-                    ended.unregister(number)
-                    worker = running.pop(number)
-                    os.close(number)
+                ended = wait([worker.outcome for worker in running.values()], TICK_S)
+                for ending in ended:
+                    worker = running.pop(ending)
                     outcome = _outcome(worker)
                     if outcome is None and worker.attempt < TRIES:
                         begin(worker.job, worker.attempt + 1)
                     else:
                         yield Finished(worker.job, outcome or Failed(given_up(worker.job, "its worker was killed")))
-                if not found:
+                if not ended:
                     yield None
         finally:
             for worker in running.values():
-                os.kill(worker.pid, signal.SIGKILL)
-            for number, worker in running.items():
-                os.waitpid(worker.pid, 0)
-                os.close(worker.outcome)
-                os.close(number)
+                worker.process.kill()
+            for worker in running.values():
+                worker.process.join()
 
     def _fork(self, job: Job, attempt: int) -> _Worker:
-        outcome = os.memfd_create("syncrelay-outcome")
-        parent = os.getpid()
+        context = multiprocessing.get_context("fork")
+        outcome, into = context.Pipe(duplex=False)
+        process = context.Process(target=_work, args=(job, os.getpid(), into, self._memory), daemon=True)
         with warnings.catch_warnings():
             # About threads: those of numpy and pyarrow are idle, and are made anew in the child.
             warnings.simplefilter("ignore", DeprecationWarning)
-            pid = os.fork()
-        if not pid:
-            _work(job, parent, outcome, self._memory)
-        return _Worker(job, attempt, pid, outcome)
+            process.start()
+        into.close()
+        return _Worker(job, attempt, process, outcome)
 
 
 def machine_memory() -> int:
@@ -110,32 +105,25 @@ def machine_memory() -> int:
     return min(whole, int(limit)) if limit.strip().isdigit() else whole
 
 
-def _work(job: Job, parent: int, outcome: int, memory: int) -> NoReturn:
-    """Do a job in a process that has just been forked, and end the process without the parent's clean-up."""
-    code = 1
-    try:
-        # A terminal sends Ctrl-C to all processes: the parent decides what it means.
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        for number in (signal.SIGTERM, signal.SIGALRM):
-            signal.signal(number, signal.SIG_DFL)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
-        end_with_parent()
-        if os.getppid() == parent:
-            resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
-            with os.fdopen(outcome, "wb") as file:
-                pickle.dump(perform(job), file)
-            code = 0
-    finally:
-        os._exit(code)
+def _work(job: Job, parent: int, outcome: Connection, memory: int) -> None:
+    # A terminal sends Ctrl-C to all processes: the parent decides what it means.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in (signal.SIGTERM, signal.SIGALRM):
+        signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
+    end_with_parent()
+    if os.getppid() == parent:
+        resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+        outcome.send(perform(job))
 
 
 def _outcome(worker: _Worker) -> Outcome | None:
-    """Return the outcome of a process that has ended, None if it died."""
-    _, status = os.waitpid(worker.pid, 0)
-    with os.fdopen(worker.outcome, "rb") as file:
-        if status == 0:
-            file.seek(0)
-            outcome: Outcome = pickle.load(file)  # noqa: S301  written by a process of ours
-            return outcome
-    worker.job.remove_scratch()
-    return Failed(took_too_long(worker.job)) if os.WTERMSIG(status) == signal.SIGALRM else None
+    """Return the outcome of a process that has one or has ended; None if it died."""
+    found: Outcome | None = None
+    with worker.outcome, suppress(EOFError, OSError):
+        found = worker.outcome.recv()
+    worker.process.join()
+    if found is None:
+        worker.job.remove_scratch()
+        return Failed(took_too_long(worker.job)) if worker.process.exitcode == -signal.SIGALRM else None
+    return found
