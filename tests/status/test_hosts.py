@@ -1,4 +1,4 @@
-"""By which names the state is told, over real sockets: those of the relay, and never that of a page's own server."""
+"""Which host names the server answers to, over real sockets: the relay's, and never that of a page's own server."""
 
 import re
 import socket
@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from syncrelay.config.listen import Listen
-from tests.status.support.serving import asked, sent, serving
+from tests.status.support.serving import ANY, asked, sent, serving
 from tests.status.support.states import relay, working
 
 HEALTHY = relay(working())
@@ -66,12 +66,6 @@ def address():
         yield address
 
 
-@pytest.mark.parametrize("host", LOOPBACK)
-@pytest.mark.parametrize("path", ["/", "/status", "/metrics"])
-def test_a_name_of_this_machine_alone_is_answered(address, host, path):
-    assert asked(address, path, host=host)[0] == 200
-
-
 @pytest.mark.parametrize("path", ["/", "/status", "/metrics", "/nowhere"])
 def test_a_name_of_somebody_else_is_refused_with_what_to_write(address, path):
     code, body = asked(address, path, host="evil.example:9464")
@@ -97,49 +91,34 @@ def test_a_request_that_names_no_host_is_answered_where_http_had_none_yet(addres
     assert refused.endswith(b"expected one `Host` header with a name or an address, and optionally a port\n")
 
 
-@pytest.mark.parametrize("host", [ALIAS, ALIAS.upper(), f"{ALIAS}.:80", "10.0.0.5", "[fd00::5]:9464", "localhost"])
-def test_what_the_file_lists_is_answered(host):
-    with serving(HEALTHY, NAMED) as address:
-        assert asked(address, "/status", host=host)[0] == 200
+_ANSWERED = {
+    ANY: dict.fromkeys(LOOPBACK, 200),
+    # What the file lists, and what is like it.
+    NAMED: {
+        **dict.fromkeys([ALIAS, ALIAS.upper(), f"{ALIAS}.:80", "10.0.0.5", "[fd00::5]:9464", "localhost"], 200),
+        **dict.fromkeys(["fleet.example", f"a.{ALIAS}", "10.0.0.6", "robot-1.fleet.example"], 403),
+    },
+    # Open to other machines: any address, and the machine's name. 0.0.0.0 is what the log shows.
+    OPEN: {
+        **dict.fromkeys(["10.0.0.5:30464", "[fd00::5]", "[fe80::5%25eth0]:9464", "0.0.0.0", "localhost"], 200),  # noqa: S104
+        **dict.fromkeys([THIS_MACHINE, THIS_MACHINE.upper(), f"{THIS_MACHINE.partition('.')[0]}.local"], 200),
+        **dict.fromkeys(["syncrelay.robots.svc", f"{THIS_MACHINE}.evil.example", "10.0.0.5.evil.example"], 403),
+    },
+    # The name that `listen` has. To the resolver 127.1 is short for 127.0.0.1, to who compares names it is one.
+    Listen("LocalHost", range(1)): {"localhost": 200},
+    Listen("127.1", range(1)): {"127.1": 200},
+}
 
 
-@pytest.mark.parametrize("host", ["fleet.example", f"a.{ALIAS}", "10.0.0.6", "robot-1.fleet.example"])
-def test_what_is_like_a_listed_name_is_not_one(host):
-    with serving(HEALTHY, NAMED) as address:
-        assert asked(address, "/status", host=host)[0] == 403
-
-
-@pytest.mark.parametrize(
-    ("host", "code"),
-    [
-        ("10.0.0.5:30464", 200),
-        ("[fd00::5]", 200),
-        ("[fe80::5%25eth0]:9464", 200),
-        ("0.0.0.0", 200),  # noqa: S104  what the log shows
-        ("localhost", 200),
-        (THIS_MACHINE, 200),
-        (THIS_MACHINE.upper(), 200),
-        (f"{THIS_MACHINE.partition('.')[0]}.local", 200),
-        ("syncrelay.robots.svc", 403),
-        (f"{THIS_MACHINE}.evil.example", 403),
-        ("10.0.0.5.evil.example", 403),
-    ],
-)
-def test_open_to_other_machines_it_answers_to_any_address_and_the_machines_name(host, code):
-    with serving(HEALTHY, OPEN) as (_, port):
-        assert asked(("127.0.0.1", port), "/status", host=host)[0] == code
-
-
-def test_the_name_that_listen_has_is_answered():
-    with serving(HEALTHY, Listen("LocalHost", range(1))) as address:
-        assert asked(address, "/status", host="localhost")[0] == 200
-    # To the resolver a short form of 127.0.0.1; to who compares names it is one as any other.
-    with serving(HEALTHY, Listen("127.1", range(1))) as address:
-        assert asked(address, "/status", host="127.1")[0] == 200
+@pytest.mark.parametrize("listen", _ANSWERED, ids=str)
+def test_what_the_file_lists_and_whoever_can_reach_it_decide_which_names_are_answered(listen):
+    with serving(HEALTHY, listen) as (_, port):
+        codes = {host: asked(("127.0.0.1", port), "/status", host=host)[0] for host in _ANSWERED[listen]}
+    assert codes == _ANSWERED[listen]
 
 
 def is_loopback(host: str) -> bool:
-    """As slow and plain as can be: what is written, one after the other."""
+    """What hosts.py decides, slowly: by what is written, one part after the other."""
     text = re.sub(r":[0-9]{0,5}$", "", host.lower()) if "]" in host or host.count(":") == 1 else host.lower()
     if text.startswith("[") and text.endswith("]"):
         return re.sub(r"%[a-z0-9._~-]+$", "", text[1:-1]) in {"::1", "0:0:0:0:0:0:0:1", "::ffff:7f00:1"}
@@ -150,7 +129,7 @@ def is_loopback(host: str) -> bool:
 
 
 def decorated(host: str, *, upper: bool, dot: bool, zone: str, port: str) -> str:
-    """The same host in other letters."""
+    """The same host, written otherwise."""
     if host.endswith("]"):
         return f"{host[:-1]}{zone}]{port}"
     return f"{host.upper() if upper else host}{'.' if dot else ''}{port}"
@@ -181,7 +160,7 @@ in_target = hosts.filter(lambda host: re.fullmatch(r"[!-~]+", host) and not set(
 def test_the_state_is_told_only_to_who_names_one_host_and_that_is_this_machine(address, named, target, version, header):
     lines = [f"GET {'' if target is None else f'http://{target}'}/status HTTP/{version}", "Connection: close"]
     lines += [f"{header}: {host}" for host in named]
-    # The blanks round a value are not of it; to a name they are nothing.
+    # Blanks around the value of a header do not count.
     all_named = [*(host.strip(" \t") for host in named), *([] if target is None else [target])]
     is_asked_right = len(named) == 1 or (not named and version == "1.0")
     expected = is_asked_right and all(map(is_loopback, all_named))

@@ -2,7 +2,7 @@
 
 import asyncio
 import re
-from contextlib import asynccontextmanager
+from contextlib import ExitStack
 from dataclasses import replace
 
 import pytest
@@ -18,24 +18,32 @@ from tests.top.terminal import Terminal
 _SMALL, _WIDE = (80, 24), (160, 45)
 
 
-@asynccontextmanager
-async def terminal(*servers, size=_SMALL):
-    app = TopApp([ask(server.url) for server in servers], period_s=0.1)
-    async with app.run_test(size=size) as pilot:
-        await pilot.pause()
-        yield Terminal(app, pilot)
+def before(*told, size=_SMALL):
+    """Have a test be what a user does at a terminal, while there is a relay of each state."""
+
+    def sit(act):
+        async def look():
+            with ExitStack() as stack:
+                relays = [stack.enter_context(running(state())) for state in told]
+                app = TopApp([ask(relay.url) for relay in relays], period_s=0.1)
+                async with app.run_test(size=size) as pilot:
+                    await pilot.pause()
+                    return await act(Terminal(app, pilot), *relays)
+
+        return lambda: asyncio.run(look())
+
+    return sit
 
 
 def at_terminal(state, *keys, size=_SMALL):
     """The lines of a terminal after some keys."""
 
-    async def look():
-        with running(state) as server:
-            async with terminal(server, size=size) as user:
-                await user.press(*keys)
-                return user.lines
+    @before(lambda: state, size=size)
+    async def look(user, *_):
+        await user.press(*keys)
+        return user.lines
 
-    return asyncio.run(look())
+    return look()
 
 
 def _begins_with(sentence, line):
@@ -115,24 +123,17 @@ def test_a_wide_terminal_shows_spans_latencies_the_sentence_and_recent_sets():
     assert any(line.strip().startswith("camera ▏") for line in lines)
 
 
-def test_groups_are_sorted_and_the_selected_one_stays_selected():
-    async def look():
-        with running(states.rig()) as server:
-            async with terminal(server) as user:
-                orders = []
-                for _ in range(4):
-                    orders.append([line.split()[0] for line in user.lines[2:6]])
-                    await user.press("s")
-                return orders, user.lines[1]
-
-    orders, heading = asyncio.run(look())
-    assert orders == [
+@before(states.rig)
+async def test_groups_are_sorted_and_the_selected_one_stays_selected(user, *_):
+    for order in (
         ["▶", "rear", "inertial", "radar"],
         ["rear", "inertial", "radar", "▶"],
         ["▶", "inertial", "radar", "rear"],
         ["▶", "rear", "inertial", "radar"],
-    ]
-    assert "STATE▾" in heading
+    ):
+        assert [line.split()[0] for line in user.lines[2:6]] == order
+        await user.press("s")
+    assert "STATE▾" in user.lines[1]
 
 
 def test_a_group_is_opened_with_figures_findings_inputs_the_strip_and_who_publishes():
@@ -161,114 +162,90 @@ def test_a_type_that_is_not_known_yet_is_said_to_be_none():
     assert "/b (sensor_msgs/msg/Image)" in lines
 
 
-def test_keys_lead_through_the_groups_and_back():
-    async def look():
-        with running(states.rig()) as server:
-            async with terminal(server) as user:
-                for key, sees in (
-                    ("enter", "── front"),
-                    ("right", "── rear"),
-                    ("n", "── inertial"),
-                    ("left", "── rear"),
-                    ("p", "── front"),
-                    ("p", "── radar"),
-                ):
-                    await user.press(key)
-                    assert user.lines[1].startswith(sees)
-                await user.press("end")
-                assert not user.lines[1].startswith("── radar")
-                await user.press("home")
-                await user.press("j")
-                assert user.lines[1].startswith("sets ")
-                await user.press("k")
-                assert user.lines[1].startswith("── radar")
-                await user.press("escape")
-                assert user.lines[1].startswith("  GROUP")
-                await user.press("question_mark")
-                assert "escape, backspace" in user.text
-                await user.press("x")
-                assert "escape, backspace" not in user.text
-                await user.press("q")
-        return user.app.return_code
-
-    assert asyncio.run(look()) == 0
+@before(states.rig)
+async def test_keys_lead_through_the_groups_and_back(user, *_):
+    for key, sees in (
+        ("enter", "── front"),
+        ("right", "── rear"),
+        ("n", "── inertial"),
+        ("left", "── rear"),
+        ("p", "── front"),
+        ("p", "── radar"),
+    ):
+        await user.press(key)
+        assert user.lines[1].startswith(sees)
+    await user.press("end")
+    assert not user.lines[1].startswith("── radar")
+    await user.press("home")
+    await user.press("j")
+    assert user.lines[1].startswith("sets ")
+    await user.press("k")
+    assert user.lines[1].startswith("── radar")
+    await user.press("escape")
+    assert user.lines[1].startswith("  GROUP")
+    await user.press("question_mark")
+    assert "escape, backspace" in user.text
+    await user.press("x")
+    assert "escape, backspace" not in user.text
+    await user.press("q")
+    assert user.app.return_code == 0
 
 
-def test_the_screen_follows_the_relay():
-    async def look():
-        with running(states.healthy()) as server:
-            async with terminal(server) as user:
-                server.state = states.silent()
-                await user.sees(states.silent().groups[0].findings[0].text)
-                assert "→ " in user.text
-
-    asyncio.run(look())
+@before(states.healthy)
+async def test_the_screen_follows_the_relay(user, server):
+    server.state = states.silent()
+    await user.sees(states.silent().groups[0].findings[0].text)
+    assert "→ " in user.text
 
 
-def test_a_held_picture_stays_and_then_shows_what_came_meanwhile():
-    async def look():
-        with running(states.healthy()) as server:
-            async with terminal(server) as user:
-                await user.press("space")
-                assert " PAUSED: press space to resume" in user.lines
-                asked = server.asked
-                server.state = states.silent()
-                while server.asked < asked + 2:
-                    await user.pilot.pause(0.05)
-                assert "silent" not in user.text
-                await user.press("space")
-                await user.sees("silent")
-                assert "PAUSED" not in user.text
-
-    asyncio.run(look())
+@before(states.healthy)
+async def test_a_held_picture_stays_and_then_shows_what_came_meanwhile(user, server):
+    await user.press("space")
+    assert " PAUSED: press space to resume" in user.lines
+    asked = server.asked
+    server.state = states.silent()
+    while server.asked < asked + 2:
+        await user.pilot.pause(0.05)
+    assert "silent" not in user.text
+    await user.press("space")
+    await user.sees("silent")
+    assert "PAUSED" not in user.text
 
 
-def test_a_relay_that_goes_away_is_said_over_its_last_state_and_found_when_it_comes_back():
-    async def look():
-        with running(states.healthy()) as server:
-            async with terminal(server) as user:
-                server.stop()
-                await user.sees("nothing listens there; still trying")
-                assert " STALE: no answer for " in user.lines[1]
-                assert user.lines[3].startswith("▶ front     OK")
-                await user.press("enter")
-                assert "STALE" in user.lines[1]
-                server.start()
-                await user.sees("── front")
-                while "STALE" in user.text:
-                    await user.pilot.pause(0.05)
-
-    asyncio.run(look())
+@before(states.healthy)
+async def test_a_relay_that_goes_away_is_said_over_its_last_state_and_found_when_it_comes_back(user, server):
+    server.stop()
+    await user.sees("nothing listens there; still trying")
+    assert " STALE: no answer for " in user.lines[1]
+    assert user.lines[3].startswith("▶ front     OK")
+    await user.press("enter")
+    assert "STALE" in user.lines[1]
+    server.start()
+    await user.sees("── front")
+    while "STALE" in user.text:
+        await user.pilot.pause(0.05)
 
 
-def test_a_group_that_a_new_file_lacks_is_said():
-    async def look():
-        with running(states.rig()) as server:
-            async with terminal(server) as user:
-                await user.press("down", "enter")
-                server.state = states.healthy()
-                await user.sees("The relay has no group rear any more.")
-                await user.press("right")
-                assert user.lines[1].startswith("── front")
-
-    asyncio.run(look())
+@before(states.rig)
+async def test_a_group_that_a_new_file_lacks_is_said(user, server):
+    await user.press("down", "enter")
+    server.state = states.healthy()
+    await user.sees("The relay has no group rear any more.")
+    await user.press("right")
+    assert user.lines[1].startswith("── front")
 
 
-def test_of_several_relays_one_is_chosen_and_another_after_it():
-    async def look():
-        with running(states.healthy()) as one, running(states.rig()) as two:
-            async with terminal(one, two) as user:
-                assert user.lines[0] == "2 relays answer. Which one?"
-                assert f"/syncrelay  {two.url}  groups: front, rear, inertial, radar" in user.lines[3]
-                await user.press("down", "enter")
-                await user.sees("  inertial  ERROR")
-                await user.press("escape")
-                await user.sees("Which one?")
-                await user.press("up", "enter")
-                await user.sees("── front")
-                assert "inertial" not in user.text
-
-    asyncio.run(look())
+@before(states.healthy, states.rig)
+async def test_of_several_relays_one_is_chosen_and_another_after_it(user, *relays):
+    assert user.lines[0] == "2 relays answer. Which one?"
+    assert f"/syncrelay  {relays[1].url}  groups: front, rear, inertial, radar" in user.lines[3]
+    await user.press("down", "enter")
+    await user.sees("  inertial  ERROR")
+    await user.press("escape")
+    await user.sees("Which one?")
+    await user.press("up", "enter")
+    await user.sees("── front")
+    assert "inertial" not in user.text
 
 
 @pytest.mark.parametrize("size", [(59, 24), (80, 14), (20, 5)])
@@ -279,18 +256,17 @@ def test_a_terminal_that_is_too_small_gets_a_sentence(size):
 
 @pytest.mark.parametrize("state", states.ALL.values(), ids=states.ALL)
 def test_every_state_fits_every_terminal(state):
-    async def look():
-        with running(state()) as server:
-            async with terminal(server) as user:
-                for size in ((60, 15), _SMALL, (200, 60)):
-                    await user.pilot.resize_terminal(*size)
-                    for key in ("enter", "escape"):
-                        await user.press(key)
-                        assert len(user.lines) == size[1]
-                        assert max(map(len, user.lines)) <= size[0]
-                        assert "Quit" in user.lines[-1]
+    @before(state)
+    async def look(user, *_):
+        for size in ((60, 15), _SMALL, (200, 60)):
+            await user.pilot.resize_terminal(*size)
+            for key in ("enter", "escape"):
+                await user.press(key)
+                assert len(user.lines) == size[1]
+                assert max(map(len, user.lines)) <= size[0]
+                assert "Quit" in user.lines[-1]
 
-    asyncio.run(look())
+    look()
 
 
 def test_sixteen_inputs_are_told_apart_by_what_differs_in_their_names():
