@@ -6,6 +6,7 @@ from itertools import pairwise
 import pytest
 
 from docs.generate import FOLDER, pages
+from syncrelay.explain import Code
 
 _PAGES = pages()
 
@@ -20,3 +21,13 @@ def test_a_page_of_the_reference_leaves_nothing_without_its_meaning(page):
     lines = _PAGES[page].splitlines()
     assert [line for line in lines if re.search(r"`: *$|\|  \||^None$", line)] == []
     assert [one for one, after in pairwise(filter(None, lines)) if one.startswith("### ") and after[:2] == "##"] == []
+
+
+def test_the_page_of_findings_says_of_each_what_it_means_and_what_to_do_unless_all_is_well():
+    _, *sections = re.split(r"(?m)^## ", _PAGES["findings.md"])
+    parts = {re.match(r"`(\w+)`\n", each)[1]: each.strip().split("\n\n")[1:] for each in sections}  # type: ignore[index]
+    assert [*parts] == [code.value for code in Code]
+    assert [code for code, (meaning, *_) in parts.items() if not meaning.endswith(".")] == []
+    without = [code for code, said in parts.items() if not any(part.startswith("**What to do:** ") for part in said)]
+    assert without == ["nobody_listens", "starting", "healthy"]
+    assert [code for code, said in parts.items() if not said[-1].startswith("- Severity: ")] == []

@@ -1,7 +1,7 @@
 """The pages of docs/reference/ that are made of what the program knows: `make reference`.
 
-What is known of a thing stands beside it: a key's description in its model, a finding's meaning at its code, an
-option's help in its parser. Here is only how a page shows it; what no single thing can say is in the templates.
+What the program shows of a thing stands beside it: a key's description in its model, an option's help in its parser.
+Here is only how a page shows it; what only a page says, such as what a finding means, is in the templates.
 """
 
 import re

@@ -1,9 +1,7 @@
-"""Every finding as its page shows it."""
+"""What the page of findings shows of each that the judge knows: how bad it is, and what it explains."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 
-from docs.generate.markdown import linked
 from syncrelay.explain import Code, Severity
 from syncrelay.explain.codes import MATCHING
 from syncrelay.explain.judge import EXPLAINS
@@ -20,33 +18,20 @@ _SAID_AS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class _Finding:
-    code: str
-    severity: str
-    meaning: str
-    remedy: str
-    explains: str
-    explains_of_input: str
+def findings() -> dict[str, str]:
+    """Return the severities of each finding and what it explains, as the last lines of its section."""
+    return {code.value: "\n".join(_lines(code)) for code in Code}
 
 
-def findings() -> tuple[_Finding, ...]:
-    """Return all, in the order in which they explain a silence."""
-    return tuple(_finding(code) for code in Code)
-
-
-def _finding(code: Code) -> _Finding:
-    explained = EXPLAINS.get(code)
-    in_group = explained.in_group if explained else frozenset()
-    of_input = explained.of_input - in_group if explained else frozenset()
-    return _Finding(
-        code.value,
-        _SAID_AS[code.severities],
-        code.meaning,
-        linked(code.remedy or ""),
-        _named(code, in_group),
-        _named(code, of_input),
-    )
+def _lines(code: Code) -> Iterator[str]:
+    yield f"- Severity: {_SAID_AS[code.severities]}."
+    if (explained := EXPLAINS.get(code)) is None:
+        return
+    in_group, of_input = _named(code, explained.in_group), _named(code, explained.of_input - explained.in_group)
+    if in_group:
+        yield f"- Explains {in_group}."
+    if of_input:
+        yield f"- Of the same input, explains {'also ' if in_group else ''}{of_input}."
 
 
 def _named(cause: Code, codes: frozenset[Code]) -> str:
