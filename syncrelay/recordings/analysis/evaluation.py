@@ -38,11 +38,6 @@ class Evaluation:
     drops: tuple[DropOut, ...]
 
 
-def completed(counts: Sequence[InputCounts], index: int) -> int:
-    """Return how many sets came together that a required input is in, also those that thinning left out."""
-    return counts[index].matched + counts[index].dropped.get(DropReason.THINNED, 0)
-
-
 class Outcomes:
     """Takes what leaves an engine."""
 

@@ -2,26 +2,22 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import ceil
 from typing import Final
 
 import yaml
 
-from syncrelay.config import GroupConfig, load_text
+from syncrelay.config import load_text
 from syncrelay.config.wording import counted, did_you_mean
 from syncrelay.errors import BagError, NothingToMatchError, UsageError
 from syncrelay.explain import words
 from syncrelay.printable import printable
 from syncrelay.recordings.analysis.analysis import analyze_group, group_of
-from syncrelay.recordings.analysis.changes import Change, with_changes, with_evidence
-from syncrelay.recordings.analysis.evaluation import completed, evaluate
+from syncrelay.recordings.analysis.changes import with_changes, with_evidence
 from syncrelay.recordings.analysis.inventory import FEWEST, Topic, inventory
 from syncrelay.recordings.analysis.pairs import pair
-from syncrelay.recordings.analysis.topics import TopicFigures
 from syncrelay.recordings.bag.bindings import GroupBinding, bind
 from syncrelay.recordings.bag.definitions import begins_with_header
 from syncrelay.recordings.bag.recording import Channel, Recording
-from syncrelay.sync.queues import LONGEST_QUEUE
 
 # Topics of one rate whose stamps lie within a tenth of a period of each other come from one epoch.
 _TOGETHER: Final = 0.1
@@ -29,8 +25,6 @@ _SAME_RATE: Final = 1.1
 _EPOCH: Final = "epoch"
 _FUSED: Final = "fused"
 _MATCHED: Final = "matched"
-_SECOND: Final = 1_000_000_000
-_QUEUE_SIZE: Final = "queue_size"
 _HEAD: Final = "version: 1\ngroups:\n"
 
 
@@ -135,43 +129,11 @@ def _measured(name: str, members: Sequence[Topic], source: str) -> str | None:
     suggestion = analyze_group(group_of(text, name), streams, text).suggestion
     if not suggestion.then:
         return None
-    changed = with_changes(text, _with_room(name, members, suggestion.changes, text))
+    changed = with_changes(text, suggestion.changes)
     sets = f"{suggestion.then} of {suggestion.possible} possible sets of {source}"
     hints = "".join(f"    # {hint}\n" for hint in suggestion.hints)
     told = changed.replace(f"  {name}:\n", f"  {name}:  # {sets}\n{hints}", 1)
     return with_evidence(told, name, [_evidence(each) for each in members])
-
-
-def _with_room(name: str, members: Sequence[Topic], changes: Sequence[Change], text: str) -> Sequence[Change]:
-    """Return changes with the queue_size that the README's rule asks for, where that is more and as many sets come.
-
-    The rule: what an input brings while the slowest is awaited, for a period of it and its latency, and twice that.
-    """
-    slowest = min(members, key=lambda each: each.figures.rate_hz).figures
-    fastest = max(members, key=lambda each: each.figures.rate_hz).figures
-    wait = (slowest.period or 0) + _latency(slowest)
-    come = ceil(wait * fastest.rate_hz / _SECOND)
-    size = min(2 * come, LONGEST_QUEUE)
-    narrow = group_of(with_changes(text, changes), name)
-    if size <= narrow.options.queue_size:
-        return changes
-    reason = f"twice the {come} messages of {fastest.topic} that may arrive before one of {slowest.topic}"
-    others = [change for change in changes if change.key != _QUEUE_SIZE]
-    wide = [*others, Change(name, None, _QUEUE_SIZE, size, reason)]
-    gives = [_sets(group, members) for group in (narrow, group_of(with_changes(text, wide), name))]
-    return wide if gives[1] >= gives[0] else changes
-
-
-def _sets(group: GroupConfig, members: Sequence[Topic]) -> int:
-    streams = tuple(each.stream for each in members)
-    rarest = min(range(len(streams)), key=lambda index: len(streams[index].stamps))
-    return completed(evaluate(group, streams).counts, rarest)
-
-
-def _latency(figures: TopicFigures) -> int:
-    """Return what a topic's messages take at the 95th percentile; 0 where its clock is another and cannot tell."""
-    delay = figures.delay
-    return max(0, delay.high) if delay is not None and abs(delay.median) < _SECOND else 0
 
 
 def _evidence(topic: Topic) -> str:

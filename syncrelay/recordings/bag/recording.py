@@ -83,43 +83,35 @@ class Recording(Protocol):
     @property
     def channels(self) -> tuple[Channel, ...]:
         """What was recorded."""
-        ...
 
     @property
     def faults(self) -> list[str]:
         """What could not be read, a sentence each; complete once all messages are read."""
-        ...
 
     @property
     def size(self) -> int:
         """How many bytes `batches` goes through, for progress."""
-        ...
 
     @property
     def position(self) -> int:
         """How many of these bytes `batches` has gone through."""
-        ...
 
     @property
     def begin(self) -> int:
         """When the first message was received in nanoseconds; 0 if there is none."""
-        ...
 
     @property
     def end(self) -> int:
         """When the last message was received in nanoseconds; 0 if there is none."""
-        ...
 
     def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
         """Yield the messages of some channels by their receive time; of equal times, as they were written.
 
         A batch is what is read at a time, and may be empty.
         """
-        ...
 
     def close(self) -> None:
         """Close the files."""
-        ...
 
 
 def batched(messages: Iterable[RawMessage]) -> Iterator[list[RawMessage]]:

@@ -22,19 +22,15 @@ class Source(Protocol):
 
     def seek(self, place: int, /) -> object:
         """Set the offset of the next read."""
-        ...
 
     def read(self, size: int, /) -> bytes:
         """Return the next `size` bytes; fewer only at the end of the file."""
-        ...
 
     def expect(self, spans: Sequence[Span]) -> None:
         """Announce what is read next, in this order, so that it can be fetched ahead and in few requests."""
-        ...
 
     def close(self) -> None:
         """Close it."""
-        ...
 
 
 class LocalFile:
