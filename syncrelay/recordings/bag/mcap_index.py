@@ -27,7 +27,7 @@ from syncrelay.recordings.bag.mcap_records import (
     require_record,
     unpacked,
 )
-from syncrelay.recordings.bag.segments import PIECE, Pieces, Segment
+from syncrelay.recordings.bag.segments import Pieces, Segment
 from syncrelay.recordings.bag.sources import NoIndexError, Source
 
 MAGIC: Final = b"\x89MCAP0\r\n"
@@ -41,6 +41,8 @@ _DATA_END_SIZE: Final = 4
 _TAIL: Final = 32_000
 # No schema or channel record is longer.
 _LONGEST_TEXT: Final = 64_000_000
+# Of a million chunks.
+_LONGEST_SUMMARY: Final = 256_000_000
 
 
 class McapIndex:
@@ -67,21 +69,6 @@ class McapIndex:
             if not file.is_near:
                 raise NoIndexError
             self._scan()
-
-    def _walk(self, place: int, end: int) -> Iterator[tuple[int, int, int]]:
-        """Yield opcode, begin and end of the content of each record between two places of the file.
-
-        Raises EOFError if the last record is cut off, and ValueError where no record begins or too many hold nothing.
-        """
-        while place < end:
-            begin = place + RECORD.size
-            opcode, length = RECORD.unpack(self._bytes(place, RECORD.size)) if begin <= end else (0, end)
-            place = begin + length
-            if place > end:
-                raise EOFError("a record ends past the end")
-            require_record(opcode)
-            self._effort.pass_record()
-            yield opcode, begin, place
 
     def _read_index(self) -> bool:
         """Take channels and chunks from the summary at the end of the file; False if there is none, or it is wrong."""
@@ -121,34 +108,32 @@ class McapIndex:
         self._file.expect([(tail, self._size - tail)])
         head, footer = self._bytes(end, RECORD.size), self._bytes(end + RECORD.size, _FOOTER.size)
         begin, _, checksum = _FOOTER.unpack(footer)
-        if head != RECORD.pack(Opcode.FOOTER, _FOOTER.size) or not len(MAGIC) <= begin < end:
+        has_footer = head == RECORD.pack(Opcode.FOOTER, _FOOTER.size)
+        if not has_footer or not len(MAGIC) <= begin < end or end - begin > _LONGEST_SUMMARY:
             raise ValueError("there is no summary")
         self._file.expect([(begin, self._size - begin)])
-        if checksum not in (0, self._checksum(begin, end + RECORD.size + _FOOTER.size - _CHECKSUM_SIZE)):
+        summary = self._bytes(begin, end - begin)
+        if checksum not in (0, zlib.crc32(head + footer[:-_CHECKSUM_SIZE], zlib.crc32(summary))):
             raise ValueError("its checksum is wrong")
         count = expected = 0
         self.counts = {}
-        for opcode, place, stop in self._walk(begin, end):
+        for opcode, place, stop in records(summary):
+            self._effort.pass_record()
+            content = summary[place:stop]
             match opcode:
                 case Opcode.SCHEMA | Opcode.CHANNEL:
-                    self._define(opcode, self._text(place, stop))
+                    self._define(opcode, content)
                 case Opcode.CHUNK_INDEX:
                     self._effort.found_message()
-                    yield parsed(ChunkIndex, self._text(place, stop))
+                    yield parsed(ChunkIndex, content)
                     count += 1
                 case Opcode.STATISTICS:
-                    statistics = parsed(Statistics, self._text(place, stop))
+                    statistics = parsed(Statistics, content)
                     expected = statistics.chunk_count
                     # Without a checksum, a flipped bit in the index could hide a channel.
                     self.counts = statistics.channel_message_counts if checksum else {}
         if expected not in (0, count):
             raise ValueError("chunks are missing in it")
-
-    def _checksum(self, begin: int, end: int) -> int:
-        checksum = 0
-        for place in range(begin, end, PIECE):
-            checksum = zlib.crc32(self._bytes(place, min(PIECE, end - place)), checksum)
-        return checksum
 
     def _text(self, begin: int, end: int) -> bytes:
         """Read the content of a record that describes something; raises ValueError if it is too large for that."""
@@ -164,11 +149,17 @@ class McapIndex:
         loose = Pieces()
         place = len(MAGIC)
         try:
-            for opcode, begin, end in self._walk(place, self._size):
-                if opcode == Opcode.DATA_END and end - begin == _DATA_END_SIZE:
+            while place < self._size:
+                begin = place + RECORD.size
+                opcode, length = RECORD.unpack(self._bytes(place, RECORD.size))
+                require_record(opcode)
+                if begin + length > self._size:
+                    raise EOFError("a record ends past the end")
+                self._effort.pass_record()
+                if opcode == Opcode.DATA_END and length == _DATA_END_SIZE:
                     break
-                self._note(opcode, begin, end, loose)
-                place = end
+                self._note(opcode, begin, begin + length, loose)
+                place = begin + length
             else:
                 self._losses.not_closed()
         except UNREADABLE:
