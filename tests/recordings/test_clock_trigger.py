@@ -1,4 +1,4 @@
-"""A clock as trigger on a recording: sets at a fixed rate, the same whatever makes them."""
+"""A clock as trigger on a recording: sets at a fixed rate, in all that commands say and write."""
 
 import json
 
@@ -6,11 +6,9 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from syncrelay.cdr import read_stamp
-from syncrelay.config import load_text
 from syncrelay.rig.schedule import SENSORS
-from syncrelay.sync import Match, Message, Ticks
+from syncrelay.sync import Ticks
 from tests.cli.command import run_here
-from tests.ros.cdr_messages import stamp_of
 from tests.ros.configs import config
 
 _TOPICS = [sensor.topic for sensor in SENSORS.values()]
@@ -53,22 +51,6 @@ def test_there_is_a_set_at_every_tick_of_none_newer_than_it(lines):
     assert len(ticks) == pytest.approx(4 * 29.97, rel=0.1)
     for tick, line in zip(ticks, lines, strict=True):
         assert all(0 <= tick - stamp <= 200_000_000 for stamp in line["stamps"].values())
-
-
-def test_they_are_those_of_the_engine_fed_with_the_arrivals_as_it_is_live(folder, lines):
-    engine = load_text(_TEXT).groups[0].engine()
-    sets: list[tuple[int | None, ...]] = []
-
-    def note(outcomes):
-        sets.extend(outcome.stamps for outcome in outcomes if isinstance(outcome, Match))
-
-    with AnyReader([folder / "rig.mcap"]) as reader:
-        for connection, received, raw in reader.messages():
-            # A loop that wakes when something comes, and seldom besides.
-            note(engine.add(Message(_TOPICS.index(connection.topic), stamp_of(raw), None), now=received))
-        end = received
-    note(engine.expire(now=end + _WAIT))
-    assert sets == [tuple(line["stamps"][topic] for topic in _TOPICS) for line in lines]
 
 
 def test_what_is_written_has_the_stamps_of_the_ticks(folder, lines):

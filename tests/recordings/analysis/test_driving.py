@@ -71,6 +71,7 @@ _POLICIES = {
     "approximate_time_eager": {"slop": "20ms"},
     "approximate_epsilon_time": {"slop": "20ms"},
     "latest_time": {"trigger": "/a", "max_age": "50ms"},
+    "latest_time by a clock": {"trigger": "29.97 Hz", "max_age": "50ms", "max_wait": "60ms"},
     "equal_key": {"key": "header.frame_id"},
 }
 
@@ -93,12 +94,15 @@ def _recordings(draw):
 @st.composite
 def _groups(draw, policy):
     topics = inputs(dict.fromkeys(_TOPICS, VECTOR))
-    keys = {"policy": policy, "topics": topics, "queue_size": draw(st.integers(1, 5)), **_POLICIES[policy]}
-    keys["restamp"] = draw(st.sampled_from(["none", "earliest", "latest", "/b"]))
+    keys = {"policy": policy.partition(" ")[0], "topics": topics, **_POLICIES[policy]}
+    is_by_clock = "max_wait" in keys
+    # While a tick is waited for, up to 4 messages of an input come.
+    keys["queue_size"] = draw(st.integers(4, 8) if is_by_clock else st.integers(1, 5))
+    keys["restamp"] = draw(st.sampled_from(["none", "earliest", "latest", "trigger" if is_by_clock else "/b"]))
     keys["every"] = draw(st.integers(1, 3))
     if draw(st.booleans()):
         keys["max_rate"] = "10 Hz"
-    if policy != "latest_time" and draw(st.booleans()):
+    if not policy.startswith("latest_time") and draw(st.booleans()):
         keys["max_wait"] = f"{draw(st.integers(0, 100))}ms"
         topics[2]["required"] = draw(st.booleans())
     if policy != "equal_key":
@@ -131,6 +135,9 @@ def _fed_one_by_one(recording, binding):
         while (deadline := engine.next_deadline()) is not None and (until is None or deadline <= until):
             left.extend((each, deadline) for each in engine.expire(now=deadline))
 
+    # A clock goes on without an end: its last tick is that of the last message.
+    last = None if binding.group.ticks is None else recording.end + binding.group.options.max_wait
+
     for index, stamp, received, frame_id in recording.rows:
         raw = recording.message(index, stamp, received, frame_id)
         stamp_read, key = message_reader(binding.group, index, raw[0])(raw)
@@ -140,7 +147,7 @@ def _fed_one_by_one(recording, binding):
         else:
             outcomes = engine.add(Message(index, stamp_read, raw, key), now=received)
         left += [(each, received) for each in outcomes]
-    expire(None)
+    expire(last)
     left += [(each, None) for each in engine.flush(DropReason.SHUTDOWN)]
     sets = [(each.stamps, now) for each, now in left if isinstance(each, Match)]
     drops = [each for each, _ in left if not isinstance(each, Match)]
