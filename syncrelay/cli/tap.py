@@ -53,8 +53,7 @@ def command(_parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
     """
     from syncrelay.cli.relays import find_one, otherwise
     from syncrelay.top.client import NoAnswerError, OtherServerError
-    from syncrelay.top.tap import Tap
-    from syncrelay.top.tap_text import plain_line
+    from syncrelay.top.tap import Tap, plain_line
     from syncrelay.wakeup import Wakeup
 
     relay = find_one(arguments.url, otherwise=otherwise(arguments.url))

@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from threading import Thread
 from types import TracebackType
-from typing import Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 from waitress.server import create_server
 from waitress.wasyncore import close_all
@@ -25,6 +25,9 @@ from syncrelay.status.hosts import Hosts
 from syncrelay.status.page import HEADERS, PATHS, page_file
 from syncrelay.status.state import RelayState, is_ready, status_of
 from syncrelay.status.taps import TapRefusedError, Taps
+
+if TYPE_CHECKING:
+    from prometheus_client import CollectorRegistry
 
 # An idle receive loop turns once a second, so one that has not for this long hangs.
 _STALLED_S: Final = 5.0
@@ -146,22 +149,17 @@ def _bound(listen: Listen) -> socket.socket:
 
 def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _Answer:
     @cache
-    def metrics() -> Any:
-        # Its import takes as long as that of everything else here, and most relays are never scraped.
-        from prometheus_client import make_wsgi_app  # noqa: PLC0415
+    def metrics() -> "CollectorRegistry":
+        from syncrelay.status.metrics import registry  # noqa: PLC0415  as below
 
-        from syncrelay.status.metrics import registry  # noqa: PLC0415
-
-        return make_wsgi_app(registry(state))
+        return registry(state)
 
     def answer_metrics(environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
-        told: list[tuple[str, list[tuple[str, str]]]] = []
-        # It handles neither HEAD nor Content-Length.
-        asked = {**environ, "REQUEST_METHOD": "GET"}
-        body = b"".join(metrics()(asked, lambda status, headers: told.append((status, headers))))
-        status, headers = told[-1]
-        start(status, [*headers, ("Content-Length", str(len(body)))])
-        return [body]
+        # Its import takes as long as that of everything else here, and most relays are never scraped.
+        from prometheus_client.exposition import choose_encoder  # noqa: PLC0415
+
+        encode, content_type = choose_encoder(environ.get("HTTP_ACCEPT", ""))
+        return _answer(start, "200 OK", encode(metrics()), content_type)
 
     answers: dict[str, _Answer] = {
         **{path: _of_page(path) for path in PATHS},

@@ -78,11 +78,9 @@ def is_ready(state: RelayState) -> bool:
 
 
 def _is_served(an_input: InputFacts) -> bool:
-    return an_input.graph.refusal is None and any(_serves(each, an_input.type) for each in an_input.graph.publishers)
-
-
-def _serves(publisher: Endpoint, type_name: str | None) -> bool:
-    return publisher.type == type_name and publisher.mismatch is None
+    publishers = an_input.graph.publishers
+    fits = any(each.type == an_input.type and each.mismatch is None for each in publishers)
+    return fits and an_input.graph.refusal is None
 
 
 def status_of(state: RelayState) -> document.Status:

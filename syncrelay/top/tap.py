@@ -1,7 +1,8 @@
-"""Follows the sets and drops of a relay over HTTP: asks again and again for those since the last answer."""
+"""Follows the sets and drops of a relay over HTTP, by asking for those since the last answer; says them in words."""
 
 import json
 import secrets
+import time
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, TypeAlias
@@ -9,10 +10,15 @@ from urllib.parse import urlencode, urlsplit
 
 from pydantic import Field, TypeAdapter, ValidationError
 
+from syncrelay.explain import words
 from syncrelay.status.document import Text
+from syncrelay.sync import DropReason
 from syncrelay.top.client import NoAnswerError, OtherServerError, connection_to, get
 
 _NAME_BYTES: Final = 8
+_NS_PER_S: Final = 1_000_000_000
+# Columns of a line that says what a reason means.
+_WIDTH: Final = 120
 
 Time: TypeAlias = Annotated[int, Field(ge=-(1 << 63), lt=1 << 63)]
 """A time that has a date."""
@@ -60,14 +66,6 @@ _ANSWER: Final = TypeAdapter(TapAnswer)
 _LINE: Final = TypeAdapter[SetLine | DropLine](SetLine | DropLine)
 
 
-def read_line(line: Mapping[str, Any]) -> SetLine | DropLine:
-    """Return a line as a value. Raises OtherServerError if it is malformed."""
-    try:
-        return _LINE.validate_python(line)
-    except ValidationError as error:
-        raise OtherServerError("what listens there is not a relay, or runs another version") from error
-
-
 class Tap:
     """A tap on the relay at a base URL, for the named groups, inputs and reasons; an empty choice is all."""
 
@@ -104,3 +102,45 @@ class Tap:
             raise OtherServerError("what listens there is not a relay, or runs another version") from error
         self._fields["after"] = answer.after
         return answer
+
+
+def plain_line(line: dict[str, Any]) -> str:
+    """Say a line in words: of a set, how much later than the earliest each stamp is, with the inputs' offsets.
+
+    Raises OtherServerError if it is malformed.
+    """
+    read = _read(line)
+    seconds, rest = divmod(read.time, _NS_PER_S)
+    when = f"{time.strftime('%H:%M:%S', time.localtime(seconds))}.{rest // 1_000_000:03}"
+    begin = f"{when} {read.group}:"
+    return f"{begin} {_of_set(read)}" if isinstance(read, SetLine) else _of_drop(begin, read)
+
+
+def _of_set(line: SetLine) -> str:
+    matched = {
+        topic: None if stamp is None else stamp + line.offsets.get(topic, 0) for topic, stamp in line.stamps.items()
+    }
+    first = min((stamp for stamp in matched.values() if stamp is not None), default=0)
+    inputs = ", ".join(f"{topic} {_after(stamp, first)}" for topic, stamp in matched.items())
+    return f"set, span {words.duration(line.span)}, latency {words.duration(line.latency)}: {inputs}"
+
+
+def _after(stamp: int | None, first: int) -> str:
+    return "missing" if stamp is None else f"+{words.duration(stamp - first)}"
+
+
+def _of_drop(begin: str, line: DropLine) -> str:
+    """Say what the reason means where that fits."""
+    meaning = {each.value: f" ({each.meaning})" for each in DropReason}.get(line.reason, "")
+    waited = f" after {words.duration(line.time - line.received)}"
+    if line.unneeded:
+        return f"{begin} drop, {line.topic} not needed ({line.reason}){waited}"
+    what = f"{begin} drop, {line.topic} {line.reason}"
+    return f"{what}{meaning if len(what + meaning + waited) <= _WIDTH else ''}{waited}"
+
+
+def _read(line: Mapping[str, Any]) -> SetLine | DropLine:
+    try:
+        return _LINE.validate_python(line)
+    except ValidationError as error:
+        raise OtherServerError("what listens there is not a relay, or runs another version") from error

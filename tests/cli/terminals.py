@@ -53,6 +53,20 @@ class Terminal:
             pass
         return self._process.wait(_DEADLINE_S)
 
+    def hang_up(self, after_s):
+        """Take the terminal away, so long after the first of what is written."""
+        self._read(time.monotonic() + _DEADLINE_S)
+        end = time.monotonic() + after_s
+        while time.monotonic() < end:
+            self._read(end)
+        self.close()
+        return self._process.wait(_DEADLINE_S)
+
+    def close(self):
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+
     def _read(self, end):
         if not select.select([self._descriptor], [], [], max(0, end - time.monotonic()))[0]:
             return False
@@ -80,12 +94,13 @@ def on_terminal(argv, *, folder, environ):
         start_new_session=True,
     )
     os.close(theirs)
+    terminal = Terminal(process, ours)
     try:
-        yield Terminal(process, ours)
+        yield terminal
     finally:
         process.kill()
         process.wait()
-        os.close(ours)
+        terminal.close()
 
 
 def shown_on_terminal(*words, folder, **environ):

@@ -15,7 +15,7 @@ from syncrelay.explain import GroupLines, RecentDrop, Tape
 from syncrelay.status import RelayState, Taps, status_of
 from syncrelay.status.server import Server
 from syncrelay.sync import DropReason
-from syncrelay.top.tap_text import plain_line
+from syncrelay.top.tap import plain_line
 from tests.cli.command import run
 from tests.hostile_names import assert_shown_safely, hostile_name
 from tests.top import states

@@ -99,5 +99,26 @@ def test_without_colour_no_colour_is_written(tmp_path):
     assert [codes for codes in parameters if colours & set(codes)] == []
 
 
+# A process learns that its terminal is gone if that is its own. nohup and many CI runners start what they run with
+# SIGHUP ignored.
+_ON_A_TERMINAL_OF_ITS_OWN = """
+import fcntl, signal, sys, termios
+signal.signal(signal.SIGHUP, signal.Handlers[sys.argv[2]])
+fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+from syncrelay.cli import main
+sys.argv = ["syncrelay", "top", "--url", sys.argv[1]]
+sys.exit(main())
+"""
+
+
+@pytest.mark.parametrize("inherited", ["SIG_DFL", "SIG_IGN"])
+@pytest.mark.parametrize("after_s", [0.0, 0.03, 0.08, 0.2, 0.6])
+def test_it_ends_with_its_terminal_however_soon_that_goes(tmp_path, after_s, inherited):
+    with running(states.healthy()) as server:
+        argv = [sys.executable, "-c", _ON_A_TERMINAL_OF_ITS_OWN, server.url, inherited]
+        with on_terminal(argv, folder=tmp_path, environ={}) as top:
+            assert top.hang_up(after_s) in {0, 1, 128 + signal.SIGHUP, -signal.SIGHUP}
+
+
 def _top(url, folder, **environ):
     return on_terminal([sys.executable, "-m", "syncrelay", "top", "--url", url], folder=folder, environ=environ)
