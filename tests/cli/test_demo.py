@@ -3,39 +3,16 @@
 import os
 import re
 import signal
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-import syncrelay.cli
 from syncrelay.cli.demo import isolation
-from syncrelay.config import load_text
-from syncrelay.rig.schedule import SENSORS
 from tests.cli.terminals import on_terminal
 from tests.ros.processes import DEADLINE_S, wait_until
 
-_SHIPPED = Path(syncrelay.cli.__file__).parent / "demo.yaml"
 _DEMO = [sys.executable, "-m", "syncrelay", "demo"]
-_WITHOUT_ROS = """
-import sys
-sys.modules["rclpy"] = None
-from syncrelay.cli import main
-sys.exit(main(["demo", "--show-config"]))
-"""
-
-
-def test_the_shipped_file_is_printed_as_it_is_without_ros():
-    shown = subprocess.run([sys.executable, "-c", _WITHOUT_ROS], check=True, capture_output=True, text=True)
-    assert shown.stdout == _SHIPPED.read_text()
-    assert shown.stderr == ""
-
-
-def test_the_shipped_file_is_valid_and_names_the_rigs_topics():
-    config = load_text(_SHIPPED.read_text())
-    topics = {topic.topic for group in config.groups for topic in group.topics}
-    assert topics == {sensor.topic for sensor in SENSORS.values()}
 
 
 @pytest.mark.parametrize(
@@ -182,10 +159,8 @@ _HANGS = (
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("fault", [None, _HANGS], ids=["in order", "sensors hang"])
-def test_the_rig_does_not_outlive_it(stage, fault):
-    if fault is not None:
-        stage.before_each_sensor(fault)
+def test_the_rig_does_not_outlive_it_though_it_hangs(stage):
+    stage.before_each_sensor(_HANGS)
     demo = stage.start("demo", _DEMO)
     demo.wait_until(lambda: "lidar_imu" in demo.stdout, "a first line")
     sensors = children(demo.pid)

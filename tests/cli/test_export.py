@@ -14,7 +14,7 @@ from mcap.writer import CompressionType
 from syncrelay.cli.demo import shipped_config
 from syncrelay.recordings.datasets import read_sets
 from tests.cli.command import run, run_python
-from tests.recordings.bag.making import rig, write_mcap, write_rosbag2
+from tests.recordings.bag.making import rig, write_mcap
 from tests.recordings.datasets.times import rows_of
 from tests.ros.cdr_messages import IMAGE, STORE, header, serialize
 from tests.ros.frames import Frame
@@ -87,37 +87,17 @@ def test_it_is_written_for_those_who_read_parts_of_it(rigged):
     assert max(file.metadata.row_group(index).total_byte_size for index in range(file.num_row_groups)) < 50_000_000
 
 
-def test_pictures_are_not_compressed_again(rigged, tmp_path):
-    done = run("export", "rig.mcap", "--config", "demo.yaml", "--group", "camera_lidar", "--images", "jpeg",
-               "-o", str(tmp_path / "out"), folder=rigged)  # fmt: skip
-    assert done.returncode == 0
-    file = exported(tmp_path, "camera_lidar")
-    group = file.metadata.row_group(0)
-    columns = {group.column(index).path_in_schema: group.column(index) for index in range(group.num_columns)}
-    assert columns["/demo/camera/image_raw.data"].compression == "UNCOMPRESSED"
-    assert file.read(["/demo/camera/image_raw"])[0][0].as_py()["data"].startswith(b"\xff\xd8")
-    assert list(tmp_path.glob("out/*/lidar_imu.parquet")) == []
-
-
-def test_each_input_may_have_a_picture_format_of_its_own(tmp_path):
+def test_each_input_may_have_a_picture_format_of_its_own_and_pictures_are_not_compressed_again(tmp_path):
     write_mcap(tmp_path / "bag.mcap", pictures())
     (tmp_path / "pair.yaml").write_text(PAIR)
-    words = ["export", "bag.mcap", "--config", "pair.yaml"]
-    for name, formats, camera in (
-        ("one", ["/lidar=png"], b"\0\0"),
-        ("each", ["/camera=jpeg", "/lidar=png"], b"\xff\xd8"),
-        ("rest", ["jpeg", "/lidar=png"], b"\xff\xd8"),
-    ):
-        options = [word for each in formats for word in ("--images", each)]
-        done = run(*words, *options, "-o", f"{name}/out", folder=tmp_path)
-        assert done.returncode == 0, done.stderr
-        (row, *_) = rows_of(exported(tmp_path / name, "front").read())
-        assert (row["/camera"]["data"][:2], row["/lidar"]["data"][:4]) == (camera, b"\x89PNG")
-    refused = run(*words, "--images", "png", "-o", "each/out", folder=tmp_path)
-    assert (refused.returncode, "holds results of other options" in refused.stderr) == (1, True)
-    sixteen = run(*words, "--images", "jpeg", "-o", "sixteen", folder=tmp_path)
-    assert sixteen.returncode == 1
-    assert "/lidar: JPEG cannot hold 16 bit images: use --images /lidar=png" in sixteen.stderr
+    words = ["export", "bag.mcap", "--config", "pair.yaml", "--images", "jpeg", "--images", "/lidar=png", "-o", "out"]
+    assert run(*words, folder=tmp_path).returncode == 0
+    file = exported(tmp_path, "front")
+    (row, *_) = rows_of(file.read())
+    assert (row["/camera"]["data"][:2], row["/lidar"]["data"][:4]) == (b"\xff\xd8", b"\x89PNG")
+    group = file.metadata.row_group(0)
+    columns = {group.column(index).path_in_schema: group.column(index) for index in range(group.num_columns)}
+    assert columns["/camera.data"].compression == columns["/lidar.data"].compression == "UNCOMPRESSED"
 
 
 def test_fields_and_raw_bytes_are_chosen_on_the_command_line(rigged, tmp_path):
@@ -142,20 +122,6 @@ def test_mcap_is_what_replay_writes(rigged, tmp_path):
     assert done.returncode == 0
     (written,) = tmp_path.glob("out/*/*.mcap")
     assert written.read_bytes() == (tmp_path / "sets.mcap").read_bytes()
-
-
-def test_the_same_command_again_does_what_is_missing(tmp_path):
-    for name in ("a.mcap", "b.mcap"):
-        write_mcap(tmp_path / name, rig())
-    (tmp_path / "pair.yaml").write_text(PAIR)
-    words = ["export", "*.mcap", "--config", "pair.yaml", "-o", "out"]
-    assert run(*words, folder=tmp_path).stdout == "out: 2 recordings: 2 done\n"
-    write_rosbag2(tmp_path / "c.mcap", rig())
-    assert run(*words, folder=tmp_path).stdout == "out: 3 recordings: 1 done, 2 done before\n"
-    other = run(*words, "--raw", folder=tmp_path)
-    assert other.returncode == 1
-    assert "holds results of other options: name another folder, or replace them with --overwrite" in other.stderr
-    assert run(*words, "--raw", "--overwrite", folder=tmp_path).stdout == "out: 3 recordings: 3 done\n"
 
 
 def test_a_group_without_sets_has_a_file_without_rows(tmp_path):

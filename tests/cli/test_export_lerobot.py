@@ -1,6 +1,5 @@
 """`syncrelay export --format lerobot`: one dataset in the folder, and the episodes that it was made of."""
 
-import json
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -45,25 +44,18 @@ def lengths(out: Path) -> list[int]:
     return pq.read_table(out / "meta/episodes/chunk-000/file-000.parquet")["length"].to_pylist()
 
 
-def test_recordings_are_episodes_in_their_order_and_are_not_done_again(folder):
+def test_recordings_are_episodes_in_their_order_and_only_what_is_missing_is_done(folder):
+    run("export", "a.mcap", *COMMAND, folder=folder)
     done = run("export", "b.mcap", "a.mcap", *COMMAND, folder=folder)
     assert done.returncode == 0
     (told,) = done.stdout.splitlines()
     assert told.endswith("/out: 2 episodes with 29 frames; 0 frames repeated, 0 sets between frames left out")
-    assert done.stderr.endswith("/out/.episodes: 2 recordings: 2 done\n")
+    assert done.stderr.endswith("/out/.episodes: 2 recordings: 1 done, 1 done before\n")
     first = contents(folder / "out")
     assert (len(first), lengths(folder / "out")) == (6, [20, 9])
     again = run("export", "b.mcap", "a.mcap", *COMMAND, "--jobs", "1", folder=folder)
     assert again.stderr.endswith("2 recordings: 2 done before\n")
     assert contents(folder / "out") == first
-
-
-def test_a_recording_more_is_an_episode_more(folder):
-    run("export", "a.mcap", *COMMAND, folder=folder)
-    done = run("export", "b.mcap", "a.mcap", *COMMAND, folder=folder)
-    assert done.stderr.endswith("2 recordings: 1 done, 1 done before\n")
-    assert lengths(folder / "out") == [20, 9]
-    assert json.loads((folder / "out/meta/info.json").read_text())["total_frames"] == 29
 
 
 def test_a_recording_that_cannot_be_an_episode_is_told_and_left_out(folder):
@@ -97,13 +89,6 @@ def test_a_task_that_is_said_once_goes_with_every_frame_or_the_key_that_costs_th
     (folder / "file.yaml").write_text(text.replace("stamp: receive", "stamp: receive, required: false"))
     done = run("export", "task.mcap", *COMMAND, "--overwrite", folder=folder)
     assert (done.returncode, why in done.stderr) == (1, True)
-
-
-def test_what_the_recording_does_not_have_is_an_error_of_the_recording(folder):
-    (folder / "file.yaml").write_text(FILE.replace("twist.linear", "twist.lin"))
-    done = run("export", "a.mcap", *COMMAND, folder=folder)
-    assert done.returncode == 1
-    assert "a.mcap: /cmd: geometry_msgs/msg/Twist has no field `lin`, did you mean `linear`?" in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -16,36 +16,27 @@ from syncrelay.cli.healthcheck import VARIABLE, Heartbeat, ailment
 _SECOND_NS = 1_000_000_000
 
 
-def test_a_relay_that_has_just_beaten_ails_nothing(tmp_path):
+def test_a_relay_is_healthy_once_it_has_beaten_whatever_an_earlier_run_left(tmp_path):
+    (tmp_path / "beat").write_text(f"{time.monotonic_ns():020d}\n")
     with Heartbeat(tmp_path / "beat") as heartbeat:
+        assert ailment(tmp_path / "beat") == "the relay is not receiving yet"
         heartbeat.beat()
         assert ailment(tmp_path / "beat") is None
 
 
-def test_a_relay_that_has_not_begun_is_no_healthy_one(tmp_path):
-    with Heartbeat(tmp_path / "beat"):
-        assert ailment(tmp_path / "beat") == "the relay is not receiving yet"
-
-
-def test_what_an_earlier_run_left_does_not_speak_for_this_one(tmp_path):
-    (tmp_path / "beat").write_text(f"{time.monotonic_ns():020d}\n")
-    with Heartbeat(tmp_path / "beat"):
-        assert ailment(tmp_path / "beat") == "the relay is not receiving yet"
-
-
-def test_a_loop_that_stopped_turning_is_told_with_its_age(tmp_path):
-    (tmp_path / "beat").write_text(f"{time.monotonic_ns() - 3600 * _SECOND_NS:020d}\n")
-    assert ailment(tmp_path / "beat") == "the receive loop last turned 3600 s ago"
-
-
-def test_a_beat_from_before_the_machine_started_is_not_believed(tmp_path):
-    (tmp_path / "beat").write_text(f"{time.monotonic_ns() + 3600 * _SECOND_NS:020d}\n")
-    assert ailment(tmp_path / "beat") == "the heartbeat is from an earlier run"
-
-
-def test_another_file_is_no_heartbeat(tmp_path):
-    (tmp_path / "beat").write_bytes(b"root:x:0:0\n\xff")
-    assert ailment(tmp_path / "beat") == f"{tmp_path}/beat is not a heartbeat of syncrelay"
+@pytest.mark.parametrize(
+    ("written", "ails"),
+    [
+        (lambda now: f"{now - 3600 * _SECOND_NS:020d}\n", "the receive loop last turned 3600 s ago"),
+        # From before the machine started.
+        (lambda now: f"{now + 3600 * _SECOND_NS:020d}\n", "the heartbeat is from an earlier run"),
+        (lambda _: "root:x:0:0\n\udcff", "PATH is not a heartbeat of syncrelay"),
+    ],
+)
+def test_what_is_no_beat_of_a_relay_that_turns_is_said(written, ails, tmp_path):
+    path = tmp_path / "beat"
+    path.write_bytes(written(time.monotonic_ns()).encode(errors="surrogateescape"))
+    assert ailment(path) == ails.replace("PATH", str(path))
 
 
 def test_nothing_is_left_after_the_end(tmp_path):

@@ -6,9 +6,6 @@ import json
 import os
 import random
 import re
-import threading
-from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 
 import pytest
@@ -28,7 +25,7 @@ from tests.recordings.bag.making import rig
 from tests.ros.cdr_messages import STORE, VECTOR
 from tests.ros.configs import config, inputs
 from tests.top import states
-from tests.top.speaker import answering
+from tests.top.speaker import answering, speaking
 from tests.top.terminal import Terminal
 
 pytestmark = pytest.mark.parametrize("seed", range(3))
@@ -219,27 +216,10 @@ def test_names_on_the_screens_of_top(chance):
     assert all(word in "".join(lines) for word in ("FORGED", "name", "\\n"))
 
 
-@contextmanager
-def _answering(first_line: bytes):
-    class Handler(BaseHTTPRequestHandler):
-        def do_GET(self) -> None:
-            self.wfile.write(first_line + b"\r\n\r\n")
-
-        def log_message(self, *_words) -> None:
-            pass
-
-    with HTTPServer(("127.0.0.1", 0), Handler) as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
-        thread.start()
-        yield f"http://127.0.0.1:{server.server_address[1]}"
-        server.shutdown()
-        thread.join()
-
-
 @pytest.mark.parametrize("begin", [b"HTTP/1.1 404 ", b"HTTP/1.1 ", b""])
 def test_answers_that_are_none(begin, chance, shown):
     reason = hostile_name(chance).replace("\n", "").replace("\r", "").encode(errors="replace")
-    with _answering(begin + reason) as url:
+    with speaking(lambda: iter([begin + reason + b"\r\n\r\n"])) as url:
         assert shown("top", "--once", "--url", url)[0] == 1
         assert shown("reload", "--url", url)[0] == 1
 

@@ -15,6 +15,7 @@ from tests.status.support.serving import running
 from tests.top import states
 
 _LONG = "x" * 300
+_NOBODY = r"no relay answers at GONE\n  GONE: nothing listens there\n"
 _REFUSED = f"""
 2 | validat f.yaml | unknown command validat, did you mean `validate`?
 2 | xyzzy | unknown command xyzzy
@@ -84,6 +85,9 @@ _REFUSED = f"""
 1 | observe --config f.yaml --write there/new.yaml | there/new.yaml: cannot be written: there is not a folder
 2 | top --json | --json goes with --once
 2 | top --url ftp://robot | --url ftp://robot: expected a host, host:port or http://host:port
+1 | top --once --url GONE | {_NOBODY}  A relay on another machine answers only if its file says
+1 | tap --url GONE | {_NOBODY}  A relay on another machine answers only if its file says
+1 | reload --url GONE | {_NOBODY}  If the relay's file says `metrics: null`, send SIGHUP to its process
 2 | tap frnt --url URL | the relay has no group `frnt`, did you mean `front`?
 2 | tap --input /nothing --url URL | the relay has no input `/nothing`
 2 | tap --reason lat --url URL | argument --reason: invalid choice: 'lat'
@@ -110,16 +114,20 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def url():
+def urls():
+    """Where a relay answers, and where nothing listens any more."""
+    with running(states.healthy()) as gone:
+        pass
     with running(states.healthy()) as server:
-        yield server.url
+        yield server.url, gone.url
 
 
 @pytest.mark.parametrize("row", _REFUSED.strip().splitlines())
-def test_what_cannot_be_is_refused_in_a_sentence(row, folder, url):
+def test_what_cannot_be_is_refused_in_a_sentence(row, folder, urls):
+    row = row.replace("URL", urls[0]).replace("GONE", urls[1]).replace(r"\n", "\n")
     code, words, said = (part.strip() for part in row.split(" | "))
     before = sorted(folder.iterdir())
-    given = shlex.split(words.replace("URL", url))
+    given = shlex.split(words)
     # The relay and what is like it take signals and set up a log.
     has_process = given[0].startswith("-") or given[0] in ("demo", "observe")
     done = (run if has_process else run_here)(*given, folder=folder)

@@ -12,18 +12,6 @@ from tests.top import states
 from tests.top.speaker import answering, speaking
 
 
-def test_where_nobody_answers_it_names_whom_it_asked(tmp_path):
-    with running(states.healthy()) as server:
-        url = server.url
-    asked = run("reload", "--url", url, folder=tmp_path)
-    assert (asked.returncode, asked.stdout) == (1, "")
-    assert asked.stderr.splitlines() == [
-        f"syncrelay: no relay answers at {url}",
-        f"  {url}: nothing listens there",
-        "  If the relay's file says `metrics: null`, send SIGHUP to its process",
-    ]
-
-
 @pytest.mark.parametrize("words", [["reload"], ["top", "--once"]])
 def test_of_several_relays_none_is_taken_for_the_one_that_is_meant(tmp_path, words):
     state = states.rig()

@@ -114,25 +114,6 @@ def test_only_drops_are_printed_where_they_are_asked_for(tmp_path, words):
     assert [line.split()[2] for line in done.stdout.splitlines()] == ["drop,", "drop,"]
 
 
-def test_without_a_relay_it_says_what_to_do(tmp_path):
-    with leaving() as url:
-        pass
-    done = run("tap", "--url", url, folder=tmp_path)
-    assert (done.returncode, done.stdout) == (1, "")
-    assert f"no relay answers at {url}\n  {url}: nothing listens there\n" in done.stderr
-
-
-def test_names_are_shown_safely_whatever_they_are():
-    chance = random.Random(18)
-    for _ in range(50):
-        line = json.loads(lines_of(GROUP).of_set(A_SET, left=_AT, received=_AT))
-        line["group"] = hostile_name(chance)
-        line["stamps"] = {hostile_name(chance): _AT, hostile_name(chance): None}
-        shown = plain_line(line)
-        assert "\n" not in shown
-        assert_shown_safely(shown)
-
-
 @pytest.mark.parametrize("key", ["time", "span", "latency", "stamps"])
 def test_a_line_of_another_server_ends_it_with_a_sentence(tmp_path, key):
     sane = {"group": "front", "time": _AT, "stamps": {"/a": _AT}, "offsets": {}, "span": 0, "latency": 0}
@@ -181,7 +162,7 @@ def test_what_a_reason_means_is_left_out_where_the_line_would_be_too_wide():
     assert short.endswith(" overflow (its queue was full) after 2 ms")
 
 
-def test_lines_are_json_whatever_names_and_numbers_are():
+def test_lines_are_json_and_shown_safely_whatever_names_and_numbers_are():
     chance = random.Random(19)
     for _ in range(200):
         names = [
@@ -195,3 +176,6 @@ def test_lines_are_json_whatever_names_and_numbers_are():
         assert line["missing"] == [name for name, stamp in line["stamps"].items() if stamp is None]
         assert (line["span"], line["latency"], line["time"]) == (max(matched) - min(matched), -2, 5)
         assert json.loads(lines.of_drop(A_DROP, left=5, received=7))["topic"] == names[1]
+        shown = plain_line(line | {"group": hostile_name(chance)})
+        assert "\n" not in shown
+        assert_shown_safely(shown)

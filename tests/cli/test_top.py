@@ -1,13 +1,11 @@
 """`syncrelay top` as a user starts it: on a terminal, without one, and where there is nothing to show."""
 
-import json
 import os
 import signal
 import sys
 
 import pytest
 
-from syncrelay.status import status_of
 from tests.cli.command import run
 from tests.cli.terminals import on_terminal
 from tests.status.support.serving import running
@@ -31,27 +29,6 @@ def test_the_state_is_printed_once_as_text_of_80_columns(tmp_path):
     assert "    900 received, 300 in sets, 2 waiting, 598 not needed, 0 dropped" in lines
     assert max(map(len, lines)) <= 80
     assert shown.stdout.isascii()
-
-
-def test_the_document_is_printed_as_it_came(tmp_path):
-    with running(states.rig()) as server:
-        shown = run("top", "--once", "--json", "--url", server.url, folder=tmp_path)
-    assert json.loads(shown.stdout) == json.loads(json.dumps(status_of(states.rig()).as_dict()))
-
-
-def test_where_no_relay_answers_it_says_what_to_do(tmp_path):
-    with running(states.healthy()) as server:
-        url = server.url
-    shown = run("top", "--url", url, folder=tmp_path)
-    assert shown.returncode == 1
-    shown = run("top", "--once", "--url", url, folder=tmp_path)
-    assert (shown.returncode, shown.stdout) == (1, "")
-    assert shown.stderr.splitlines() == [
-        f"syncrelay: no relay answers at {url}",
-        f"  {url}: nothing listens there",
-        "  A relay on another machine answers only if its file says",
-        "  `metrics: {listen: 0.0.0.0:9464}` and no firewall is in between.",
-    ]
 
 
 def test_without_a_terminal_it_points_to_text(tmp_path):
