@@ -13,9 +13,9 @@ from syncrelay.sync import (
     ExactTime,
     LatestAtTicks,
     LatestTime,
+    SyncGroup,
     Ticks,
 )
-from tests.sync.support.grouped import grouped
 from tests.sync.support.timeline import TICK_NS, play_group, play_policy
 
 
@@ -49,6 +49,6 @@ def test_the_drawing_of_a_policy_is_what_it_does(policy):
 
 
 def test_the_drawing_of_a_clock_as_trigger_is_what_it_does():
-    left, drawn = play_group(grouped(LatestAtTicks(**SIZES, ticks=Ticks(20))), drawing_in(LatestAtTicks.__doc__))
+    left, drawn = play_group(SyncGroup(LatestAtTicks(**SIZES, ticks=Ticks(20))), drawing_in(LatestAtTicks.__doc__))
     assert left == drawn
     assert len(left) > 0

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from syncrelay.sync import Drop, DropReason, Match, Message, Restamp
+from syncrelay.sync import Drop, DropReason, Match, Message
 from tests.sync.support.rigs import (
     BY_CLOCK,
-    BY_STAMP,
     ONCE,
     POLICIES,
     START,
@@ -236,30 +235,6 @@ def only_required(values, chosen):
     return tuple(value for value, needed in zip(values, chosen.required, strict=False) if needed)
 
 
-@pytest.mark.parametrize("policy", BY_STAMP)
-@given(rig=rigs(thinned=False, offset=True))
-def test_an_offset_is_as_if_the_stamps_were_other_ones(policy, rig):
-    chosen, taken = rig
-    moved = [
-        step
-        if step.message is None or step.message.stamp == 0
-        else replace(
-            step,
-            message=replace(step.message, stamp=step.message.stamp + chosen.offsets[step.message.input] * TICK),
-        )
-        for step in taken
-    ]
-    told = run(make_group(policy, replace(chosen, restamp=None)), taken)
-    expected = run(make_group(policy, replace(chosen, restamp=None, offsets=())), moved)
-    assert [list(map(names, outcomes)) for outcomes in told] == [list(map(names, outcomes)) for outcomes in expected]
-
-
-def names(outcome):
-    if isinstance(outcome, Drop):
-        return outcome.message.payload, outcome.reason
-    return tuple(message and message.payload for message in outcome.messages)
-
-
 @every_policy
 @given(rig=rigs(disorder=False, thinned=False), every=few(1, 4), period=few(1, 8))
 def test_thinning_lets_some_sets_pass_whole_and_evenly(policy, rig, every, period):
@@ -274,22 +249,6 @@ def test_thinning_lets_some_sets_pass_whole_and_evenly(policy, rig, every, perio
     for first in range(len(stamps)):
         for last in range(first, len(stamps)):
             assert last - first + 1 <= (stamps[last] - stamps[first]) // (period * TICK) + 2
-
-
-@every_policy
-@given(rig=rigs())
-def test_restamp_is_a_stamp_of_the_set(policy, rig):
-    chosen, taken = rig
-    for match in sets_of(flat(run(make_group(policy, chosen), taken))):
-        stamps = [message.stamp for message in members(match)]
-        if chosen.restamp is None:
-            assert match.stamp is None
-        elif chosen.restamp is Restamp.LATEST:
-            assert match.stamp == max(stamps)
-        elif chosen.restamp is Restamp.EARLIEST or match.messages[chosen.restamp] is None:
-            assert match.stamp == min(stamps)
-        else:
-            assert match.stamp == match.messages[chosen.restamp].stamp
 
 
 @every_policy
@@ -310,40 +269,6 @@ def test_the_second_pass_of_a_looped_recording_gives_the_sets_of_the_first(polic
     group = make_group(policy, chosen)
     one = run(group, recording)
     two = run(group, again)
-    assert sets_of(flat(two)) == sets_of(flat(one))
-
-
-@every_policy
-@given(rig=rigs(disorder=False, optional=False, limited=False), data=st.data())
-def test_left_overs_of_the_first_pass_do_not_disturb_the_second(policy, rig, data):
-    chosen, taken = rig
-    taken = [step.message for step in taken if step.message is not None]
-    assume(taken)
-    end = taken[-1].stamp + 200 * TICK
-    tail = [
-        Message(index, end + number * TICK, f"{index}{number}", key=-1)
-        for number in range(3)
-        for index in range(chosen.n_inputs)
-    ]
-    recording = [*taken, *tail]
-    group = make_group(policy, chosen)
-    one = [group.add(message, now=0) for message in recording]
-    # What the inputs still have of the first pass comes among the first messages of the second.
-    late = tail[-chosen.n_inputs + 1 :] if chosen.n_inputs > 1 else []
-    group = make_group(policy, chosen)
-    for message in recording[: len(recording) - len(late)]:
-        group.add(message, now=0)
-    begun, two = {taken[0].input}, [group.add(taken[0], now=0)]
-    waiting = list(late)
-    for message in recording[1:]:
-        for over in [over for over in waiting if over.input not in begun and message not in tail]:
-            if data.draw(st.booleans()):
-                continue
-            waiting.remove(over)
-            assert list(group.add(over, now=0)) == [Drop(over, DropReason.TIME_JUMP)]
-        if message.input not in begun:
-            begun.add(message.input)
-        two.append(group.add(message, now=0))
     assert sets_of(flat(two)) == sets_of(flat(one))
 
 

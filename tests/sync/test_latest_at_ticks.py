@@ -4,9 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncrelay.sync import Drop, DropReason, LatestAtTicks, LatestTime, Match, Message, Restamp, Ticks
+from syncrelay.sync import Drop, DropReason, LatestAtTicks, Match, Message, Restamp, SyncGroup, Ticks
 from syncrelay.sync.latest_at_ticks import REST_NS
-from tests.sync.support.grouped import grouped
 from tests.sync.support.rigs import START, TICK, Step, options, run, steps, take
 from tests.sync.support.timeline import START_NS, TICK_NS, group_cases
 
@@ -14,25 +13,16 @@ from tests.sync.support.timeline import START_NS, TICK_NS, group_cases
 def by_clock(inputs=2, queue=10, age=None, hz=20, **options):
     """Ticks at columns 0, 5, 10, ..."""
     max_ages_ns = [None if age is None else age * TICK_NS] * inputs
-    return grouped(
-        LatestAtTicks(n_inputs=inputs, queue_size=queue, ticks=Ticks(hz), max_ages_ns=max_ages_ns), **options
-    )
+    policy = LatestAtTicks(n_inputs=inputs, queue_size=queue, ticks=Ticks(hz), max_ages_ns=max_ages_ns)
+    return grouped(policy, **options)
 
 
-third_optional = {"inputs": 3, "required": (True, True, False)}
+def grouped(policy, *, max_wait=None, **options):
+    return SyncGroup(policy, max_wait_ns=None if max_wait is None else max_wait * TICK_NS, **options)
+
 
 test_drawn = group_cases(
     {
-        "at each tick the latest of every input leaves, be it the same as before": (
-            by_clock,
-            """
-            lidar |.a.....b........
-            odom  |..A.............
-            -> @5: aA
-            -> @10: bA
-            -> @15: bA
-            """,
-        ),
         "max_wait is how long a message may be on its way": (
             partial(by_clock, max_wait=3),
             """
@@ -43,16 +33,6 @@ test_drawn = group_cases(
             -> b: a superseded
             -> @8: bc
             -> @13: bc
-            """,
-        ),
-        "a message that comes when its tick has left serves the next": (
-            by_clock,
-            """
-            lidar |.a..b......
-            odom  |..A...c....
-            arrive: a A c b
-            -> @5: aA
-            -> @10: bc
             """,
         ),
         "no set leaves when a required input has nothing young enough": (
@@ -72,14 +52,6 @@ test_drawn = group_cases(
             lidar |.a...
             odom  |....A.
             -> a: a expired
-            """,
-        ),
-        "a message of just the greatest age still serves": (
-            partial(by_clock, age=4),
-            """
-            lidar |.a....
-            odom  |.A....
-            -> @5: aA
             """,
         ),
         "of the messages between two ticks only the last is kept": (
@@ -113,17 +85,6 @@ test_drawn = group_cases(
             -> e: c overflow
             """,
         ),
-        "what is not newer than a message that has served is late": (
-            by_clock,
-            """
-            lidar |..b....
-            lidar |.a.....
-            odom  |A......
-            arrive: A b a
-            -> a: a superseded
-            -> @5: bA
-            """,
-        ),
         "a later message of a stamp that is queued replaces the one before": (
             by_clock,
             """
@@ -133,24 +94,6 @@ test_drawn = group_cases(
             arrive: A a b
             -> b: a duplicate
             -> @5: bA
-            """,
-        ),
-        "only every second set leaves, by ticks": (
-            partial(by_clock, every=2),
-            """
-            lidar |.a......b.......
-            odom  |.A..............
-            -> @5: aA
-            -> @15: bA
-            """,
-        ),
-        "max_rate thins by the times of ticks, not by the stamps that are held": (
-            partial(by_clock, min_set_period_ns=10 * TICK_NS),
-            """
-            lidar |.a..................
-            odom  |.A..................
-            -> @5: aA
-            -> @15: aA
             """,
         ),
     }
@@ -194,23 +137,6 @@ def test_every_time_lies_between_two_ticks(numerator, denominator, time):
     assert ticks.at(last) <= time < ticks.at(last + 1)
     first = ticks.first_from(time)
     assert ticks.at(first - 1) < time <= ticks.at(first)
-
-
-@pytest.mark.parametrize(("numerator", "denominator"), [(0, 1), (-1, 1), (1, 0)])
-def test_a_rate_that_is_not_above_0_is_refused(numerator, denominator):
-    with pytest.raises(ValueError, match="must be 1 or more"):
-        Ticks(numerator, denominator)
-
-
-@pytest.mark.parametrize("wrong", [{"required": (False, False)}, {"required": (True,)}, {"max_ages_ns": (None, -1)}])
-def test_options_out_of_range_are_refused(wrong):
-    with pytest.raises(ValueError, match="must be"):
-        LatestAtTicks(**{"n_inputs": 2, "queue_size": 1, "ticks": Ticks(20), **wrong})
-
-
-def test_a_stamp_of_ticks_needs_a_clock():
-    with pytest.raises(ValueError, match="clock"):
-        grouped(LatestTime(n_inputs=2, queue_size=1, trigger=0), restamp=Restamp.TICK)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 from functools import partial
 
-import pytest
-
 from syncrelay.sync import DropReason, LatestTime, Message
 from tests.sync.support.timeline import TICK_NS, play_policy, policy_cases
 
@@ -33,14 +31,6 @@ test_drawn = policy_cases(
             -> b: bA
             -> c: cA
             -> d: dA
-            """,
-        ),
-        "a message of just the greatest age still serves": (
-            latest,
-            """
-            lidar |...ab
-            odom  |A....
-            -> a: aA
             """,
         ),
         "a trigger waits for an input that has nothing for it yet": (
@@ -80,18 +70,6 @@ test_drawn = policy_cases(
             -> c: cB-
             """,
         ),
-        "what is not newer than a message that has served is late": (
-            latest,
-            """
-            lidar |..a
-            odom  |.A.
-            odom  |BC.
-            arrive: A a B C
-            -> a: aA
-            -> B: B late
-            -> C: C late
-            """,
-        ),
     }
 )
 
@@ -120,40 +98,3 @@ def test_a_trigger_that_overflows_waits_no_longer():
         policy.add(Message(index, column * TICK_NS, None))
     # Two of the odometry's went, and of the triggers after 12, which find it too old, two wait.
     assert (policy.waits_started, policy.waits_ended, policy.buffered(0)) == (6, 4, 2)
-
-
-@pytest.mark.parametrize("columns", [(5, 6, 7), (6, 7, 8, 9)], ids=["older", "of its stamp"])
-def test_an_input_that_has_what_a_trigger_needs_needs_no_longer_queue(columns):
-    policy = latest(3, queue=2)
-    for column in columns:
-        policy.add(Message(1, column * TICK_NS, None))
-    for index, column in ((2, 9), (0, 8)):
-        outcomes = policy.add(Message(index, column * TICK_NS, None))
-    assert [drop.reason for drop in outcomes] == [DropReason.TOO_FAR]
-    assert [policy.needed_queue(place) for place in (0, 1, 2)] == [None, None, None]
-
-
-def test_a_queue_that_lost_only_what_was_too_old_was_long_enough():
-    policy = latest(queue=5, age=1)
-    for column in (1, 2, 3, 11, 12, 13, 14, 15):
-        policy.add(Message(1, column * TICK_NS, None))
-    policy.add(Message(0, 8 * TICK_NS, None))
-    assert policy.needed_queue(1) is None
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"trigger": -1},
-        {"trigger": 2},
-        {"required": (False, True)},
-        {"required": (True,)},
-        {"max_ages_ns": (None, -1)},
-        {"max_ages_ns": (None,)},
-        {"n_inputs": 0},
-        {"queue_size": 0},
-    ],
-)
-def test_options_out_of_range_are_refused(wrong):
-    with pytest.raises(ValueError, match="must be"):
-        LatestTime(**{"n_inputs": 2, "queue_size": 1, "trigger": 0, **wrong})

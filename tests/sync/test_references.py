@@ -83,6 +83,7 @@ def test_a_policy_gives_what_its_reference_gives(make):
             message = Message(index, stamp, number, key=stamp // (20 * MS))
             given = policy.add(message)
             assert told(given) == told(reference.add(message)), f"seed {seed}, event {number}"
+            assert policy.waits_started - policy.waits_ended == reference.waiting(), f"seed {seed}, event {number}"
             sets += len(told(given)[0])
     assert sets > 1_000, "too few sets to prove anything"
 
@@ -95,10 +96,3 @@ def test_long_searches_give_what_single_steps_give():
         for number, (index, stamp) in enumerate(gappy(rng, sizes["n_inputs"], 300)):
             message = Message(index, stamp, number)
             assert told(policy.add(message)) == told(reference.add(message)), f"seed {seed}, event {number}"
-
-
-def test_nothing_waits_in_a_policy_that_decides_at_once():
-    for make in (exact_time, approximate_time_eager, approximate_epsilon_time, equal_key):
-        policy, _ = make(random.Random(0), {"n_inputs": 2, "queue_size": 2})
-        policy.add(Message(0, 1, None))
-        assert (policy.waits_started, policy.waits_ended, policy.release_oldest()) == (0, 0, ())

@@ -21,6 +21,9 @@ class ReferenceApproximateTime:
         self.cursors = [0 for _ in self.inputs]
         self.pivot = None
 
+    def waiting(self):
+        return int(self.pivot is not None)
+
     def scale(self, duration):
         return int(duration * self.factor)
 

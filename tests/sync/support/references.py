@@ -54,6 +54,10 @@ class Queued:
     def take(self, message):
         raise NotImplementedError
 
+    def waiting(self):
+        """How many sets wait for something better, or triggers for what is missing."""
+        return 0
+
     def add(self, message):
         self.left = []
         self.take(message)
@@ -151,6 +155,9 @@ class ReferenceLatest(Queued):
         if len(self.of(message.input)) > self.queue_size:
             self.forget(self.of(message.input)[0], DropReason.OVERFLOW)
 
+    def waiting(self):
+        return len(self.of(self.trigger))
+
     def serve(self, trigger):
         found = [self.find(index, trigger) for index in range(self.n_inputs)]
         if "wait" in found and "never" not in found:
@@ -188,12 +195,11 @@ class ReferenceLatest(Queued):
             self.drop(message, reason)
 
 
-class ReferenceEqualKey:
+class ReferenceEqualKey(Queued):
     """Required inputs only."""
 
     def __init__(self, n_inputs, queue_size):
-        self.n_inputs = n_inputs
-        self.queue_size = queue_size
+        super().__init__(n_inputs, queue_size)
         self.queues: list[list[Message]] = [[] for _ in range(n_inputs)]
 
     def add(self, message):
