@@ -93,15 +93,14 @@ def command(parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
         from syncrelay.ros.relay import Relay
 
     def managed(relay: Relay) -> Callable[..., Any]:
-        from syncrelay.ros.lifecycle import ManagedNode
-        from syncrelay.ros.managed import Managed
+        from syncrelay.ros.lifecycle import ManagedNode, Transitions
 
         def require(config: "Config") -> None:
             require_groups(groups, config, config_paths)
 
         return partial(
             ManagedNode,
-            transitions=Managed(relay, paths=config_paths, require=require, is_stopped=lambda: stop.requested),
+            transitions=Transitions(relay, paths=config_paths, require=require, is_stopped=lambda: stop.requested),
         )
 
     stop.defer()

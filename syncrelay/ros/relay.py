@@ -192,6 +192,11 @@ class Relay:
         """The names of the groups that run, or will once the node is active."""
         return tuple(group.config.name for group in self._groups.bindings.groups)
 
+    @property
+    def is_active(self) -> bool:
+        """Whether its groups receive and publish, or are about to."""
+        return self._phase in _ACTIVE
+
     def offer(self, services: Offered) -> None:
         """Offer services on the node. Their functions are called on its executor's thread, and must not wait."""
         self._services = Services(self.node, services, bugs=self._bugs)
@@ -349,7 +354,7 @@ class Relay:
         except CancelledError:
             # The receive thread has ended: the next turn raises why.
             return self.monitor.reports
-        if self._phase in _ACTIVE:
+        if self.is_active:
             self._phase = Phase.PAUSED if self._groups.is_paused else Phase.RUNNING
         self._reporters.publish(self.monitor.reports, advice=self._advice)
         return self.monitor.reports
