@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
 from syncrelay.config import TopicConfig
 from syncrelay.config.names_in_graph import manifest_topic
@@ -20,8 +20,6 @@ from syncrelay.sync import DropReason
 
 # Within this time, a subscriber that is restarted or waits for publishers of another QoS is back.
 _GRACE_S: Final = 2.0
-
-PublishersOf: TypeAlias = Callable[[GroupRelay], Sequence[Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,41 +46,6 @@ class GroupBinding:
         return [each.output.publisher for each in self.inputs if each.output.publisher is not None]
 
 
-class Listeners:
-    """Counts the subscribers of lazy groups. On the main thread."""
-
-    def __init__(self, loop: ReceiveLoop) -> None:
-        self._loop = loop
-        self._unheard_since: dict[GroupRelay, float] = {}
-
-    def count(self, lazy: Sequence[GroupBinding], more: PublishersOf) -> None:
-        """Wake the groups that have a subscriber, and put to sleep those that have had none for a while.
-
-        `more` returns a group's publishers beside its outputs', whose subscribers count too.
-        """
-        now = time.monotonic()
-        unheard = [each for each in lazy if not any(map(has_subscriber, (*each.publishers, *more(each.group))))]
-        self._unheard_since = {each.group: self._unheard_since.get(each.group, now) for each in unheard}
-        for binding in lazy:
-            group, since = binding.group, self._unheard_since.get(binding.group)
-            if since is None and group.sleeps:
-                self._switch(binding, group.wake)
-            elif since is not None and not group.sleeps and now - since >= _GRACE_S:
-                self._switch(binding, group.sleep)
-
-    def _switch(self, binding: GroupBinding, switch: Callable[[], None]) -> None:
-        """Feed all inputs of a group, or none, between two messages; then have their topics subscribed, or not."""
-
-        def turn() -> None:
-            switch()
-            for each in binding.inputs:
-                each.topic.outputs.feed()
-
-        self._loop.call(turn).result()
-        for each in binding.inputs:
-            each.topic.try_again()
-
-
 class GroupBindings:
     """All groups that run, in the file's order; one input per topic, however many use it and whatever they call it."""
 
@@ -97,7 +60,8 @@ class GroupBindings:
         self._topics: dict[Subscription, TopicInput] = {}
         # By topic, the publishers whose types held groups had taken: their successors keep these types.
         self._taken: dict[str, Endpoint] = {}
-        self._listeners = Listeners(loop)
+        # Since when lazy groups have had no subscriber.
+        self._unheard_since: dict[GroupRelay, float] = {}
 
     @property
     def groups(self) -> list[GroupRelay]:
@@ -109,13 +73,36 @@ class GroupBindings:
         """Each topic once."""
         return list(self._topics.values())
 
-    def count_listeners(self, more: PublishersOf) -> None:
-        """Put lazy groups to sleep while nobody subscribes to their outputs; a relay that only observes has none.
+    def count_listeners(self, more: Callable[[GroupRelay], Sequence[Any]]) -> None:
+        """Wake the lazy groups that have a subscriber, and put to sleep those that have had none for a while.
 
-        `more` returns a group's publishers beside its outputs'. On the main thread.
+        `more` returns a group's publishers beside its outputs', whose subscribers count too. A relay that only observes
+        has no lazy groups. On the main thread.
         """
-        if self._entities.purpose is Purpose.RELAY:
-            self._listeners.count([binding for binding in self.all if binding.group.config.options.lazy], more)
+        if self._entities.purpose is not Purpose.RELAY:
+            return
+        now = time.monotonic()
+        lazy = [binding for binding in self.all if binding.group.config.options.lazy]
+        unheard = [each for each in lazy if not any(map(has_subscriber, (*each.publishers, *more(each.group))))]
+        self._unheard_since = {each.group: self._unheard_since.get(each.group, now) for each in unheard}
+        for binding in lazy:
+            group, since = binding.group, self._unheard_since.get(binding.group)
+            if since is None and group.sleeps:
+                self._switch_over(binding, group.wake)
+            elif since is not None and not group.sleeps and now - since >= _GRACE_S:
+                self._switch_over(binding, group.sleep)
+
+    def _switch_over(self, binding: GroupBinding, switch: Callable[[], None]) -> None:
+        """Feed all inputs of a group, or none, between two messages; then have their topics subscribed, or not."""
+
+        def turn() -> None:
+            switch()
+            for each in binding.inputs:
+                each.topic.outputs.feed()
+
+        self._loop.call(turn).result()
+        for each in binding.inputs:
+            each.topic.try_again()
 
     def run(self, groups: Sequence[GroupRelay]) -> None:
         """Run these groups and no others; those that ran already are left as they are. On the main thread.

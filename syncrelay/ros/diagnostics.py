@@ -1,7 +1,8 @@
 """What the relay publishes about itself: /diagnostics, and figures for plotting."""
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -20,8 +21,6 @@ _LEVELS: Final = {
     Level.ERROR: DiagnosticStatus.ERROR,
     Level.STALE: DiagnosticStatus.STALE,
 }
-# In the place of a group's name, which is never empty.
-_ALL: Final = ""
 _NS_PER_MS: Final = 1e6
 _NS_PER_SECOND: Final = 1e9
 
@@ -32,34 +31,33 @@ class Reporters:
     def __init__(self, node: Any, entities: Entities) -> None:
         self._node = node
         self._entities = entities
-        self._wanted: tuple[str, ...] = ()
+        self._wanted: dict[str, Callable[[], Diagnostics | Scalars]] = {}
         self._reporters: dict[str, Diagnostics | Scalars] = {}
         self._once = OnceLog()
 
     def configure(self, config: Config, groups: Sequence[str]) -> None:
         """Publish what this file asks for of these groups from now on; what was published before goes on."""
         asked = config.diagnostics if self._entities.purpose is Purpose.RELAY else None
-        self._wanted = () if asked is None else (_ALL, *groups) if asked.scalars else (_ALL,)
-        for key in [key for key in self._reporters if key not in self._wanted]:
+        self._wanted = {}
+        if asked is not None:
+            self._wanted[DIAGNOSTICS] = lambda: Diagnostics(self._node, self._entities)
+            if asked.scalars:
+                self._wanted |= {group: partial(Scalars, self._entities, group) for group in groups}
+        for key in self._reporters.keys() - self._wanted.keys():
             self._reporters.pop(key).close()
         self._make()
 
     def publish(self, reports: Sequence[GroupReport], *, advice: str | None = None) -> None:
         """Publish the state of all groups, and why a managed node gives nothing."""
         self._make()
-        if isinstance(diagnostics := self._reporters.get(_ALL), Diagnostics):
-            diagnostics.publish(reports, advice=advice)
-        for report in reports:
-            if isinstance(scalars := self._reporters.get(report.facts.name), Scalars):
-                scalars.publish(report)
+        for each in self._reporters.values():
+            each.publish(reports, advice=advice)
 
     def _make(self) -> None:
-        for key in self._wanted:
+        for key, make in self._wanted.items():
             if key not in self._reporters:
                 try:
-                    self._reporters[key] = (
-                        Diagnostics(self._node, self._entities) if key == _ALL else Scalars(self._entities, key)
-                    )
+                    self._reporters[key] = make()
                 except RefusedError as error:
                     self._once.log(logging.WARNING, str(error))
 
@@ -79,17 +77,16 @@ class Diagnostics:
         if self._publisher.get_subscription_count():
             array = DiagnosticArray(status=[self._status(report) for report in reports])
             if advice is not None:
-                array.status.append(self._of_node(advice))
+                warn, name = DiagnosticStatus.WARN, self._name
+                array.status.append(
+                    DiagnosticStatus(level=warn, name=name.lstrip("/"), message=advice, hardware_id=name)
+                )
             array.header.stamp = self._node.get_clock().now().to_msg()
             self._publisher.publish(array)
 
     def close(self) -> None:
         """Publish no more."""
         self._entities.end(self._publisher)
-
-    def _of_node(self, advice: str) -> DiagnosticStatus:
-        name = self._name.lstrip("/")
-        return DiagnosticStatus(level=DiagnosticStatus.WARN, name=name, message=advice, hardware_id=self._name)
 
     def _status(self, report: GroupReport) -> DiagnosticStatus:
         return DiagnosticStatus(
@@ -107,6 +104,7 @@ class Scalars:
     def __init__(self, entities: Entities, group: str) -> None:
         """Raise RefusedError where DDS does not make one of the publishers."""
         self._entities = entities
+        self._group = group
         self._publishers: dict[str, Any] = {}
         try:
             for figure in SCALARS:
@@ -115,9 +113,11 @@ class Scalars:
             self.close()
             raise
 
-    def publish(self, report: GroupReport) -> None:
+    def publish(self, reports: Sequence[GroupReport], *, advice: str | None) -> None:  # noqa: ARG002  as Diagnostics
         """Publish the rate, and span and latency if sets left."""
-        figures = report.facts.figures
+        figures = next((each.facts.figures for each in reports if each.facts.name == self._group), None)
+        if figures is None:
+            return
         values = {"sets_hz": figures.rate_hz}
         if figures.last_sets:
             span, latency = figures.last_sets[0]

@@ -9,13 +9,10 @@ from typing import Any, Final
 import rclpy
 from rclpy.context import Context
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
-from rclpy.signals import SignalHandlerOptions
 
 from syncrelay.config import Config
-from syncrelay.environment.domain import require_domain
 from syncrelay.errors import RosUnavailableError
 from syncrelay.explain import GraphSnapshot
-from syncrelay.ros.environment import keep_stdout, log_arguments
 from syncrelay.ros.graph import snapshot
 from syncrelay.ros.leaving import leave
 from syncrelay.ros.start import make_node, resolver, start
@@ -25,18 +22,8 @@ _NAME: Final = "_syncrelay_observer"
 _DISCOVERY: Final = ("ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "ROS_AUTOMATIC_DISCOVERY_RANGE")
 
 
-def join(context: Context, name: str, *, namespace: str = "", arguments: Sequence[str] = ()) -> Any:
-    """Start rclpy in a context, signals left alone, and return a node; its name begins with an underscore.
-
-    Raises RosUnavailableError where ROS_DOMAIN_ID names no domain.
-    """
-    require_domain(os.environ)
-    keep_stdout()
-    rclpy.init(
-        args=["--ros-args", "--disable-stdout-logs", "--disable-rosout-logs", *log_arguments()],
-        context=context,
-        signal_handler_options=SignalHandlerOptions.NO,
-    )
+def _hidden(context: Context, name: str, *, namespace: str = "", arguments: Sequence[str] = ()) -> Any:
+    """Return a node in a context of `_started`; its name begins with an underscore."""
     return rclpy.create_node(
         name,
         namespace=namespace,
@@ -46,6 +33,10 @@ def join(context: Context, name: str, *, namespace: str = "", arguments: Sequenc
         start_parameter_services=False,
         enable_rosout=False,
     )
+
+
+def _started() -> Context:
+    return start(["--disable-rosout-logs"], simulated=False)
 
 
 def join_hidden(config: Config, ros_args: Sequence[str]) -> tuple[Context, Any, str]:
@@ -67,17 +58,17 @@ def join_hidden(config: Config, ros_args: Sequence[str]) -> tuple[Context, Any, 
             node.destroy_node()
         finally:
             context.try_shutdown()
-    hidden = Context()
+    hidden = _started()
     arguments = ["-p", f"use_sim_time:={is_simulated}", *remaps]
-    return hidden, join(hidden, _NAME, namespace=namespace, arguments=arguments), name
+    return hidden, _hidden(hidden, _NAME, namespace=namespace, arguments=arguments), name
 
 
 @contextmanager
 def hidden_node(name: str) -> Iterator[Any]:
     """Join the graph with a hidden node, and leave it; raises RosUnavailableError where rclpy does not start."""
-    context, node = Context(), None
+    context, node = _started(), None
     try:
-        node = join(context, name)
+        node = _hidden(context, name)
         yield node
     except _rclpy.RCLError as error:
         raise RosUnavailableError(f"cannot look at the graph: {error}") from error
