@@ -9,6 +9,7 @@ import numpy as np
 from syncrelay.config import Distance, Tolerance
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
+from syncrelay.explain.changes import Changes
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.facts import GroupFacts, InputFacts
@@ -17,7 +18,7 @@ from syncrelay.explain.nearest import quantile, shifted, signed_distances
 from syncrelay.explain.rules_flow import fates
 from syncrelay.explain.rules_stamps import offered_offset, other_clock
 from syncrelay.explain.standing import Standing
-from syncrelay.explain.trials import REQUIRED, UNTRIED, Changes, Trials, Verdict
+from syncrelay.explain.trials import REQUIRED, UNTRIED, Trials, Verdict
 from syncrelay.sync.messages import DropReason
 
 # Sets are too wide if this share of the slowest input's messages has no set, and at least this many were measured.

@@ -5,12 +5,13 @@ from typing import Final
 
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
+from syncrelay.explain.changes import offset_change
 from syncrelay.explain.clocks import BOOT_NS, Drift, apart, time_scale
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Fault, Found, blocks, counted, nodes
 from syncrelay.explain.rules_flow import waited_for_relay
-from syncrelay.explain.trials import REQUIRED, Trials, Verdict, offset_change
+from syncrelay.explain.trials import REQUIRED, Trials, Verdict
 from syncrelay.sync.messages import DropReason
 
 # Stamps further off than this come from another clock, or are older than a queue should hold.

@@ -10,14 +10,14 @@ from functools import cached_property
 from itertools import chain, combinations
 from math import ceil
 from statistics import median_low
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from syncrelay.config import Distance, GroupConfig
-from syncrelay.config.file import file_format
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
+from syncrelay.explain.changes import Change, Changes, changed, offset_change
 from syncrelay.explain.clocks import time_scale
 from syncrelay.explain.dry_run import EngineDriver
 from syncrelay.explain.nearest import (
@@ -52,17 +52,6 @@ _SAME_RATE: Final = 0.05
 
 REQUIRED: Final = None
 """Stands for the sets of the required inputs, where an index stands for those with that optional input."""
-
-
-class Change(NamedTuple):
-    """A value to write: of a group, or of one of its inputs."""
-
-    key: str
-    value: str
-    input: int | None = None
-
-
-Changes: TypeAlias = tuple[Change, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,7 +267,7 @@ class Trials:
         merged = {each.key: each for each in chosen}
         for each in more:
             before = merged.get(each.key)
-            if before is None or each.key == "policy" or _parsed(before) < _parsed(each):
+            if before is None or each.key == "policy" or before.parsed < each.parsed:
                 merged[each.key] = each
         return tuple(merged.values())
 
@@ -398,40 +387,7 @@ def _waits(*each: int) -> Iterator[Changes]:
     yield from ((Change("max_wait", words.at_least(wait)),) for wait in each if wait <= LONGEST)
 
 
-def offset_change(index: int, by: int) -> Change | None:
-    """Return an offset of an input as it stands in the file; None of one that is too large to be written there."""
-    return Change("offset", words.exactly(by), index) if abs(by) <= LONGEST else None
-
-
 def with_headroom(spans: Nanoseconds) -> str:
     """Return the duration, as it stands in the file, that 99 % of spans keep to, and half of what they scatter by."""
     most = quantile(spans, 0.99)
     return words.at_least(most + (most - quantile(spans, 0.5)) // 2)
-
-
-def changed(config: GroupConfig, changes: Changes) -> GroupConfig:
-    """Return a group as it would be with other values in the file."""
-    options, topics = config.options, list(config.topics)
-    values = {each.key: _parsed(each) for each in changes if each.input is None}
-    if "policy" in values:
-        form, policy = file_format(), values["policy"]
-        of_policy = tuple(form.topics[policy].model_construct(**dict(topic)) for topic in options.topics)
-        known = {key: value for key, value in dict(options).items() if key in form.groups[policy].model_fields}
-        options = form.groups[policy].model_construct(**{**known, **values, "topics": of_policy})
-    elif values:
-        options = options.model_copy(update=values)
-    for each in changes:
-        if each.input is not None:
-            topics[each.input] = replace(topics[each.input], offset_ns=_parsed(each))
-    return replace(config, options=options, topics=tuple(topics))
-
-
-def _parsed(change: Change) -> Any:
-    match change.key:
-        case "policy":
-            return change.value
-        case "queue_size":
-            return int(change.value)
-        case _:
-            # A policy's tolerance, whatever its key, `max_wait` or `offset`.
-            return parse_duration(change.value)

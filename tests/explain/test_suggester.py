@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import Code, Finding, FindingLog, Severity
+from syncrelay.explain.changes import Change
 from syncrelay.explain.nearest import as_arrays
 from syncrelay.explain.suggester import Suggester
-from syncrelay.explain.trials import REQUIRED, Change, Trials, Tried, Verdict
+from syncrelay.explain.trials import REQUIRED, Trials, Tried, Verdict
 from syncrelay.explain.try_budget import OutOfTimeError, TryBudget
 from syncrelay.sync import Message
 from tests.explain.scenario import BEGAN, MS, Source, Told, group_of, run

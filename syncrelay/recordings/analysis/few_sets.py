@@ -7,7 +7,7 @@ from typing import Final
 from syncrelay.config import GroupConfig
 from syncrelay.config.wording import counted
 from syncrelay.explain import words
-from syncrelay.explain.trials import Change, changed
+from syncrelay.explain.changes import Change, changed
 from syncrelay.recordings.analysis.evaluation import evaluate
 from syncrelay.recordings.analysis.streams import Stream, read_streams
 from syncrelay.recordings.bag.bindings import GroupBinding

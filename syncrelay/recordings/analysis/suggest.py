@@ -9,8 +9,8 @@ from syncrelay.config import GroupConfig
 from syncrelay.config.units import parse_duration
 from syncrelay.config.wording import all_of
 from syncrelay.explain import words
+from syncrelay.explain.changes import Change as TriedChange
 from syncrelay.explain.nearest import Received, quantile
-from syncrelay.explain.trials import Change as TriedChange
 from syncrelay.explain.trials import Trials
 from syncrelay.recordings.analysis.changes import Change
 from syncrelay.recordings.analysis.evaluation import Evaluation, evaluate
