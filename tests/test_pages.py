@@ -10,8 +10,7 @@ import pytest
 import yaml
 
 from syncrelay.config import load_text
-from syncrelay.config.difference import difference
-from syncrelay.config.difference_report import difference_lines
+from syncrelay.config.difference import difference, difference_lines
 from syncrelay.config.file import file_format
 from syncrelay.config.graph import as_mermaid, as_text, drawing_of
 from syncrelay.recordings.cases import check, load_suite_text

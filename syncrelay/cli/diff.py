@@ -14,7 +14,7 @@ def parser() -> Parser:
         "syncrelay diff",
         example="syncrelay diff fusion.yaml wider.yaml",
         description="Says what a reload would do to a relay that runs OLD and reads NEW: which groups go on, are "
-        "rebuilt, start and end, for which keys, and which subscriptions and publishers go and come. Needs no ROS. "
+        "rebuilt, start and end, and for which keys. Needs no ROS. "
         "For files that run together, name a directory of them. "
         "Exit code 0 if nothing changes, 1 if something does or a file has an error.",
     )
@@ -27,8 +27,7 @@ def parser() -> Parser:
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay diff`. Raises ConfigError with what is wrong with either file."""
     from syncrelay.config import Config, ConfigError, Problem, load
-    from syncrelay.config.difference import difference
-    from syncrelay.config.difference_report import difference_as_json, difference_lines
+    from syncrelay.config.difference import difference, difference_as_json, difference_lines
 
     if arguments.old == arguments.new == "-":
         parser.error("standard input can be read only once")

@@ -1,16 +1,16 @@
-"""The difference between two files, key by key with values as written, and what a reload would do."""
+"""The difference between two files, key by key with values as written, and what a reload would do: text and JSON."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 from syncrelay.config.document import EXTENSION, MappingNode
 from syncrelay.config.keys import Keys
 from syncrelay.config.load import Config
-from syncrelay.config.names_in_graph import MANIFEST_TYPE, manifest_topic
 from syncrelay.config.problems import Path
-from syncrelay.config.reload import Exchange, Subscription, exchange, needs_restart
+from syncrelay.config.reload import Exchange, exchange, needs_restart
 from syncrelay.config.resolved import GroupConfig
+from syncrelay.config.wording import all_of, counted
 
 _FROM_ELSEWHERE: Final = ("output", "type")
 """Keys of a topic that output_prefix or another group may say for it."""
@@ -42,15 +42,6 @@ class GroupChange:
 
 
 @dataclass(frozen=True, slots=True)
-class Endpoints:
-    """Topics with their types, and QoS of subscriptions, that a reload removes, creates and recreates."""
-
-    lost: tuple[tuple[str, ...], ...]
-    made: tuple[tuple[str, ...], ...]
-    made_again: tuple[tuple[str, ...], ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class Difference:
     """What a reload from one file to another does; `restart` are changed keys that it refuses."""
 
@@ -58,8 +49,6 @@ class Difference:
     restart: tuple[str, ...]
     sections: tuple[KeyChange, ...]
     groups: tuple[GroupChange, ...]
-    subscriptions: Endpoints
-    publishers: Endpoints
 
     @property
     def is_empty(self) -> bool:
@@ -78,8 +67,6 @@ def difference(old: Config, new: Config) -> Difference:
         restart=needs_restart(old, new),
         sections=tuple(section_changes(old, new)),
         groups=tuple(_Pair(old, new, *pair).change() for pair in pairs),
-        subscriptions=_subscriptions(old, new),
-        publishers=_publishers(old, new, kept=changed.kept),
     )
 
 
@@ -125,15 +112,14 @@ class _Pair:
         both = [name for name in names if name in names_before]
         return GroupChange(
             name=self.now.name,
-            keys=(*self._options(), *(key for name in both for key in self._topic(name))),
+            keys=(
+                *self._keys(self.before.options, self.now.options, self.now.path, self.now.path),
+                *(key for name in both for key in self._topic(name)),
+            ),
             removed=tuple(name for name in names_before if name not in names),
             added=tuple(name for name in names if name not in names_before),
             reordered=both != [name for name in names_before if name in names],
         )
-
-    def _options(self) -> Iterator[KeyChange]:
-        path = self.now.path
-        yield from self._keys(self.before.options, self.now.options, path, path)
 
     def _topic(self, name: str) -> Iterator[KeyChange]:
         at_before, at = self.before.inputs.names.index(name), self.now.inputs.names.index(name)
@@ -156,42 +142,67 @@ class _Pair:
                     yield KeyChange(key, old, new)
 
 
-def _subscriptions(old: Config, new: Config) -> Endpoints:
-    def of(config: Config) -> dict[Subscription, tuple[str, ...]]:
-        return {
-            Subscription.of(topic, topic=name): (name, topic.type or "", _qos(config, (*path, "qos")))
-            for group in config.groups
-            for name, (path, topic) in zip(group.inputs.names, group.paths(), strict=True)
-        }
-
-    before, now = of(old), of(new)
-    return Endpoints(
-        lost=tuple(told for key, told in before.items() if key not in now),
-        made=tuple(told for key, told in now.items() if key not in before),
-    )
-
-
-def _qos(config: Config, path: Path) -> str:
-    return config.written(path) or "auto"
+def difference_lines(found: Difference) -> Iterator[str]:
+    """Yield what a reload does, in lines."""
+    yield _summary(found)
+    yield from (f"  {section}" for section in found.sections)
+    gone = found.exchange
+    if not found.is_empty and not found.restart:
+        yield from (f"  {name}: keeps running, loses nothing" for name in gone.kept)
+    rebuilt = "changed" if found.restart else "rebuilt; what waits in its queues is dropped"
+    for change in found.groups:
+        # A restart rebuilds all groups; only those with changed keys get lines.
+        if lines := list(_group_lines(change)):
+            yield f"~ {change.name}: {rebuilt}"
+            yield from (f"    {line}" for line in lines)
+    yield from (f"+ {name}: started" for name in gone.started)
+    yield from (f"- {name}: ended" for name in gone.ended)
 
 
-def _publishers(old: Config, new: Config, *, kept: tuple[str, ...]) -> Endpoints:
-    before, now = ({each[0]: each for group in config.groups for each in _of(group, config)} for config in (old, new))
-    anew = {each[0]: each for group in new.groups if group.name not in kept for each in _outputs(group, new)}
-    return Endpoints(
-        lost=tuple(each for topic, each in before.items() if topic not in now),
-        made=tuple(each for topic, each in now.items() if topic not in before),
-        made_again=tuple(each for topic, each in anew.items() if topic in before),
-    )
+def _summary(found: Difference) -> str:
+    gone = found.exchange
+    if found.is_empty:
+        return f"a reload changes nothing: {counted(len(gone.kept), 'group')} unchanged"
+    if found.restart:
+        keys = all_of(f"`{key}`" for key in found.restart)
+        return f"a reload would be refused: {keys} cannot change while the relay runs; after a restart:"
+    done = {"keeps": gone.kept, "rebuilds": gone.rebuilt, "starts": gone.started, "ends": gone.ended}
+    return "a reload " + all_of(f"{verb} {counted(len(names), 'group')}" for verb, names in done.items() if names)
 
 
-def _of(group: GroupConfig, config: Config) -> Iterator[tuple[str, str]]:
-    yield from _outputs(group, config)
-    if group.options.manifest:
-        # A group that replaces another of its name keeps the manifest's publisher.
-        yield config.node.absolute(manifest_topic(group.name)), MANIFEST_TYPE
+def _group_lines(change: GroupChange) -> Iterator[str]:
+    yield from map(str, change.keys)
+    yield from (f"{topic}: no longer an input" for topic in change.removed)
+    yield from (f"{topic}: a new input" for topic in change.added)
+    if change.reordered:
+        yield "its inputs are in another order"
 
 
-def _outputs(group: GroupConfig, config: Config) -> Iterator[tuple[str, str]]:
-    for topic in group.topics:
-        yield config.node.absolute(topic.output), topic.type or ""
+def difference_as_json(found: Difference) -> dict[str, Any]:
+    """Return what json.dumps takes."""
+    gone = found.exchange
+    return {
+        "reload": "none" if found.is_empty else "refused" if found.restart else "taken",
+        "restart": list(found.restart),
+        "sections": [_key_as_json(each) for each in found.sections],
+        "groups": {
+            "kept": list(gone.kept),
+            "rebuilt": [_group_as_json(each) for each in found.groups],
+            "started": list(gone.started),
+            "ended": list(gone.ended),
+        },
+    }
+
+
+def _key_as_json(change: KeyChange) -> dict[str, Any]:
+    return {"key": change.key, "old": change.old, "new": change.new}
+
+
+def _group_as_json(change: GroupChange) -> dict[str, Any]:
+    return {
+        "name": change.name,
+        "keys": [{"topic": each.topic, **_key_as_json(each)} for each in change.keys],
+        "inputs_removed": list(change.removed),
+        "inputs_added": list(change.added),
+        "inputs_reordered": change.reordered,
+    }

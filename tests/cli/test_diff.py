@@ -31,23 +31,18 @@ def test_what_a_reload_would_do_is_told_in_lines(folder):
         "~ front: rebuilt; what waits in its queues is dropped",
         "    queue_size: not set -> 5",
         "    /b qos: not set -> sensor_data",
-        "subscriptions:",
-        "- /b sensor_msgs/msg/Image",
-        "+ /b sensor_msgs/msg/Image qos sensor_data",
-        "publishers:",
-        "~ /front/a sensor_msgs/msg/Image: made again",
-        "~ /front/b sensor_msgs/msg/Image: made again",
     ]
 
 
 def test_what_needs_a_restart_is_told_first(folder):
     done = run_here("diff", "good.yaml", "node.yaml", folder=folder)
-    assert done.stdout.splitlines()[:3] == [
+    assert done.stdout.splitlines() == [
         "a reload would be refused: `node` cannot change while the relay runs; after a restart:",
         "  node.name: not set -> other",
         "~ front: changed",
+        "    queue_size: not set -> 5",
+        "    /b qos: not set -> sensor_data",
     ]
-    assert "made again" not in done.stdout
 
 
 def test_programs_get_json(folder):
@@ -58,8 +53,6 @@ def test_programs_get_json(folder):
         {"topic": None, "key": "queue_size", "old": None, "new": "5"},
         {"topic": "/b", "key": "qos", "old": None, "new": "sensor_data"},
     ]
-    assert told["subscriptions"]["made"] == [{"topic": "/b", "type": "sensor_msgs/msg/Image", "qos": "sensor_data"}]
-    assert {each["topic"] for each in told["publishers"]["made"]} == {"/other/front/sets"}
 
 
 def test_a_faulty_file_is_an_error_and_not_a_difference(folder):

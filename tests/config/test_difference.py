@@ -112,26 +112,6 @@ def test_a_type_that_another_group_writes_is_told(environ):
     ]
 
 
-def test_subscriptions_are_shared_and_end_with_their_last_group(environ):
-    old = file(FRONT, REAR)
-    assert between(old, file(FRONT), environ).subscriptions.lost == (("/c", "sensor_msgs/msg/Image", "auto"),)
-    changed = between(old, file(FRONT, group("rear", "/a", "/c", keys="queue_size: 5")), environ).subscriptions
-    assert (changed.lost, changed.made) == ((), ())
-    other_qos = between(file(FRONT), file(FRONT.replace("/b,", "/b, qos: sensor_data,")), environ).subscriptions
-    assert other_qos.lost == (("/b", "sensor_msgs/msg/Image", "auto"),)
-    assert other_qos.made == (("/b", "sensor_msgs/msg/Image", "sensor_data"),)
-
-
-def test_a_rebuilt_groups_publishers_are_made_again_but_that_of_its_manifest(environ):
-    new = file(group("front", "/a", "/b", keys="queue_size: 5"))
-    found = between(file(FRONT, REAR), new, environ).publishers
-    assert [each[0] for each in found.lost] == ["/rear/a", "/rear/c", "/syncrelay/rear/sets"]
-    assert found.made == ()
-    assert [each[0] for each in found.made_again] == ["/front/a", "/front/b"]
-    quiet = between(file(FRONT), file(group("front", "/a", "/b", keys="manifest: false")), environ).publishers
-    assert [each[0] for each in quiet.lost] == ["/syncrelay/front/sets"]
-
-
 @pytest.mark.parametrize(
     ("top", "restart", "sections"),
     [
@@ -180,6 +160,4 @@ def test_of_any_two_files_all_that_changes_is_told_and_nothing_else(seed: int, e
     pairs = {name: (getattr(old, name), getattr(new, name)) for name in ("node", "listen", "diagnostics")}
     changed = {name for name, (was, is_now) in pairs.items() if was != is_now}
     assert sections == {"metrics" if name == "listen" else name for name in changed}
-    back = difference(new, old)
-    assert (back.subscriptions.lost, back.subscriptions.made) == (found.subscriptions.made, found.subscriptions.lost)
     assert difference(old, old).is_empty

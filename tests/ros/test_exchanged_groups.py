@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from syncrelay.config import Config, StampField, load_text
-from syncrelay.config.difference import Difference, difference
+from syncrelay.config.reload import Subscription, exchange
 from syncrelay.errors import ReloadError
 from syncrelay.explain import Endpoint, Refusal
 from tests.ros.configs import config
@@ -231,28 +231,11 @@ def test_a_field_that_a_type_does_not_have_stops_the_one_input_that_asks_for_it(
 _STAYS = [("/s", _IMU, "/so"), ("/t", _FIELD, "/to")]
 
 
-def _entities(here: SimpleNamespace) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The publishers and subscriptions, by topic."""
-    node = here.node
-    publishers, subscriptions = ({each.topic_name: each for each in of} for of in (node.publishers, node.subscriptions))
-    return publishers, subscriptions
-
-
-def _names(told: tuple[tuple[str, ...], ...]) -> set[str]:
-    """Their topics; nobody publishes manifests here."""
-    return {each[0] for each in told if not each[0].endswith("/sets")}
-
-
-def _check_told(told: Difference, before: tuple[dict[str, Any], ...], now: tuple[dict[str, Any], ...]) -> None:
-    """What `syncrelay diff` says of two files is what became of the entities."""
-    (published, subscribed), (publishes, subscribes) = before, now
-    assert _names(told.publishers.lost) == published.keys() - publishes.keys()
-    assert _names(told.publishers.made) == publishes.keys() - published.keys()
-    both = published.keys() & publishes.keys()
-    assert _names(told.publishers.made_again) == {each for each in both if published[each] is not publishes[each]}
-    stayed = {name for name, each in subscribed.items() if subscribes.get(name) is each}
-    assert _names(told.subscriptions.lost) == subscribed.keys() - stayed
-    assert _names(told.subscriptions.made) == subscribes.keys() - stayed
+def _subscriptions(here: SimpleNamespace, file: Config) -> dict[Subscription, Any]:
+    """The subscriptions by their keys: one stays where a file has its key again."""
+    by_topic = {each.topic_name: each for each in here.node.subscriptions}
+    topics = [topic for group in file.groups for topic in group.topics]
+    return {Subscription.of(each, topic=each.topic): by_topic[each.topic] for each in topics}
 
 
 def _any_groups(chance: random.Random) -> dict[str, list[tuple[str, str, str]]]:
@@ -283,15 +266,14 @@ def test_any_groups_take_the_place_of_any_others_or_leave_them_as_they_were(here
     kept = {id(each) for each in (*here.node.publishers, *here.node.subscriptions)}
     refused = 0
     for _ in range(40):
-        before, entities_before = here.bindings.groups, _entities(here)
+        before, subscribed = here.bindings.groups, _subscriptions(here, running)
         likelihood = chance.choice([0, 0, 0.1, 0.5])
         here.entities.refuses = lambda likelihood=likelihood: chance.random() < likelihood
         file = _file(stays=_STAYS, **_any_groups(chance))
-        told = difference(running, file)
+        kept_names = exchange(running.groups, file.groups).kept
         by_name = {each.config.name: each for each in before}
         asked = [
-            by_name[each.name] if each.name in told.exchange.kept else GroupRelay(each, now=lambda: 0)
-            for each in file.groups
+            by_name[each.name] if each.name in kept_names else GroupRelay(each, now=lambda: 0) for each in file.groups
         ]
         try:
             here.bindings.run(asked)
@@ -310,7 +292,8 @@ def test_any_groups_take_the_place_of_any_others_or_leave_them_as_they_were(here
         assert not any(each.missing and "DDS" in each.missing for each in here.bindings.topics)
         assert kept <= {id(each) for each in (*here.node.publishers, *here.node.subscriptions)}
         if running is file:
-            _check_told(told, entities_before, _entities(here))
+            now = _subscriptions(here, file)
+            assert all(now[key] is each for key, each in subscribed.items() if key in now)
     assert refused
 
 
