@@ -149,7 +149,7 @@ def _files(pattern: str) -> _Completer:
 
 
 def _groups(_typed: str, arguments: Namespace) -> Iterator[str]:
-    """Give the groups of the files that --config names; of a faulty file, those before its fault."""
+    """Give the groups of the files that --config names; none of a file that is not valid YAML."""
     for name in arguments.config or ():
         with suppress(OSError):
             for path in map(Path, yaml_files(str(Path(name).expanduser()))):

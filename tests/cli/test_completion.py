@@ -138,18 +138,17 @@ def test_a_name_that_a_terminal_must_not_see_is_not_offered(folder):
     ("text", "names"),
     [
         (_FILE, ["front", "rear"]),
-        ("groups:\n  front: {topics: [{topic: /a}]}\n  rear: {topics: ]\n  left: {}\n", ["front", "rear"]),
+        ("groups:\n  front: {topics: [{topic: /a}]}\n  rear: {topics: ]\n  left: {}\n", []),
         ("groups: {front: &f {a: [1, 2]}, rear: *f}", ["front", "rear"]),
         ("defaults: {groups: {none: 1}}\ngroups: {? [1] : 2, front: 1}", ["front"]),
-        ("groups: {<<: *shared, front: {<<: *f}}", ["front"]),
+        ("shared: &s {}\ngroups: {<<: *s, front: {<<: *s}}", ["front"]),
         ("groups: [front, rear]", []),
         ("- groups: {front: 1}", []),
         ("\tgroups: {front: 1}", []),
         ("", []),
-        ("groups:\n  front: {}\n---\ngroups:\n  rear: {}\n", ["front", "rear"]),
     ],
 )
-def test_the_groups_of_a_faulty_file_are_those_before_its_fault(text, names):
+def test_the_groups_of_a_file_are_the_keys_below_groups_where_it_is_valid(text, names):
     assert list(group_names(text.encode())) == names
 
 

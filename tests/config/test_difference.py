@@ -8,8 +8,8 @@ import pytest
 from syncrelay.config import load_text
 from syncrelay.config.difference import Difference, KeyChange, difference
 from syncrelay.config.reload import exchange
-from tests.config.any_files import any_file
 from tests.config.test_together import file, group
+from tests.drawn_files import any_file
 
 FRONT, REAR = group("front", "/a", "/b"), group("rear", "/a", "/c")
 
@@ -144,10 +144,10 @@ def test_keys_of_the_users_own_are_not_told_and_values_stay_on_one_line(environ)
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_of_any_two_files_all_that_changes_is_told_and_nothing_else(seed: int, environ):
+def test_of_any_two_files_all_that_changes_is_told_and_nothing_else(seed: int):
     """What a group is built of, and each section, changes if and only if something is told of it."""
     chance = random.Random(seed)
-    (_, old), (_, new) = (any_file(chance, environ) for _ in range(2))
+    (_, old), (_, new) = (any_file(chance) for _ in range(2))
     found = difference(old, new)
     before = {group.name: group for group in old.groups}
     rebuilt = [group.name for group in new.groups if group.name in before and group != before[group.name]]

@@ -10,7 +10,7 @@ from syncrelay.config import Config, load_text
 from syncrelay.config.file import file_format
 from syncrelay.explain.dry_run import EngineDriver
 from syncrelay.sync import Match, Message, Outcome
-from tests.config.any_files import models_of
+from tests.drawn_files import models_of
 
 MS = 1_000_000
 IMAGE = "sensor_msgs/msg/Image"

@@ -1,8 +1,6 @@
 """A fault hides no other, nothing is said that only follows from one, and what is checked is what the relay uses."""
 
-import json
 import random
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -91,63 +89,3 @@ def test_one_more_fault_at_the_end_of_a_file_hides_none_above(file: Path, enviro
         return
     more = f"{text.rstrip()}\none_more_fault: 1\n"
     assert _sentences(before) <= _sentences(_problems(more, environ))
-
-
-_ABSENT = object()
-
-
-def _file(chance: random.Random) -> dict[str, object]:
-    names = ("/a", "/b", "b", "~/a", "/front/a", "/front/b", "/robot/b", "/x/a")
-
-    def maybe(key: str, *values: object) -> dict[str, object]:
-        value = chance.choice((_ABSENT, _ABSENT, *values))
-        return {} if value is _ABSENT else {key: value}
-
-    def group() -> dict[str, object]:
-        topics = [
-            {"topic": name, "type": "sensor_msgs/msg/Image", **maybe("output", *names)}
-            for name in chance.sample(names, 2)
-        ]
-        return {"policy": "exact_time", **maybe("output_prefix", "", "/", "~", "/x", "x", "/front"), "topics": topics}
-
-    groups = {name: group() for name in ("front", "rear")[: chance.randint(1, 2)]}
-    return {"version": 1, "diagnostics": None, "node": maybe("namespace", "/robot"), "groups": groups}
-
-
-def _names(file: dict, *, of: str) -> list[tuple[str, str]]:
-    """The inputs or outputs of a file as README says that they are named, each with its group."""
-    namespace = file["node"].get("namespace", "")
-    named = []
-    for group, keys in file["groups"].items():
-        for topic in keys["topics"]:
-            below = topic["topic"].removeprefix("~").removeprefix("/")
-            prefix = keys.get("output_prefix", f"{topic['topic'].removesuffix(below)}{group}")
-            default = topic["topic"] if prefix == "" else f"{prefix.rstrip('/')}/{below}"
-            name = topic["topic"] if of == "topic" else topic.get("output", default)
-            if name.startswith("~"):
-                name = f"{namespace}/syncrelay{name[1:]}"
-            named.append((group, name if name.startswith("/") else f"{namespace}/{name}"))
-    return named
-
-
-def test_a_file_is_refused_for_names_that_meet_in_the_relay_and_for_no_others():
-    refused = 0
-    for seed in range(400):
-        file = _file(random.Random(seed))
-        inputs, outputs = _names(file, of="topic"), [name for _, name in _names(file, of="output")]
-        meet = (
-            len(set(inputs)) < len(inputs)
-            or len(set(outputs)) < len(outputs)
-            or bool({name for _, name in inputs} & set(outputs))
-        )
-        config = None
-        with suppress(ConfigError):
-            config = load_text(json.dumps(file), environ={})
-        assert (config is None) == meet, file
-        if config is None:
-            refused += 1
-            continue
-        absolute = config.node.absolute
-        assert [absolute(topic.output) for group in config.groups for topic in group.topics] == outputs
-        assert [name for group in config.groups for name in group.inputs.names] == [name for _, name in inputs]
-    assert 40 < refused < 360

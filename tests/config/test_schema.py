@@ -11,7 +11,7 @@ from jsonschema import Draft7Validator
 
 from syncrelay.config.file import file_format
 from syncrelay.config.schema import json_schema
-from tests.config.any_files import models_of
+from tests.drawn_files import models_of
 
 HERE = Path(__file__).parent
 FORMAT = file_format()

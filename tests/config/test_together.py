@@ -6,14 +6,14 @@ from pathlib import Path
 import pytest
 
 from syncrelay.config import Config, ConfigError, load, load_text
-from tests.config.any_files import any_file, parts_of
+from tests.drawn_files import any_file, parts_of
 
-_TOPIC = "      - {{topic: {topic}, type: sensor_msgs/msg/{kind}}}\n"
+_TOPIC = "      - {{topic: {topic}, type: sensor_msgs/msg/Image}}\n"
 
 
-def group(name: str, *topics: str, keys: str = "", kind: str = "Image") -> str:
+def group(name: str, *topics: str, keys: str = "") -> str:
     """A group of a file, with its keys in a line above its topics."""
-    listed = "".join(_TOPIC.format(topic=topic, kind=kind) for topic in topics)
+    listed = "".join(_TOPIC.format(topic=topic) for topic in topics)
     return f"  {name}:\n    policy: exact_time\n{keys and f'    {keys}'}{keys and chr(10)}    topics:\n{listed}"
 
 
@@ -58,10 +58,10 @@ def test_files_together_are_what_one_file_with_all_their_groups_is(environ):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_any_file_is_what_its_parts_are_together(seed: int, environ):
+def test_any_file_is_what_its_parts_are_together(seed: int):
     chance = random.Random(seed)
-    keys, whole = any_file(chance, environ)
-    parts = together(environ, **{f"part{number}": text for number, text in enumerate(parts_of(keys, chance))})
+    keys, whole = any_file(chance)
+    parts = together({}, **{f"part{number}": text for number, text in enumerate(parts_of(keys, chance))})
     assert ({each.name: each for each in parts.groups}, parts.node, parts.listen, parts.diagnostics) == (
         {each.name: each for each in whole.groups},
         whole.node,
@@ -108,35 +108,11 @@ def test_defaults_without_a_group_are_refused(environ):
     ]
 
 
-def test_outputs_that_meet_are_refused_across_files(environ):
-    assert errors(environ, one=FRONT, two=file(group("rear", "/a", "/b", keys="output_prefix: /front"))) == [
-        f"two.yaml:{line}:17: groups.rear.topics[{index}].topic: the default output `/front/{topic}` is already used on"
-        f" line {line - 1} of one.yaml: choose another `output`"
-        for index, (line, topic) in enumerate([(7, "a"), (8, "b")])
-    ]
-
-
 def test_an_output_that_another_file_takes_in_is_a_loop(environ):
     (error,) = errors(environ, one=FRONT, two=file(group("rear", "/front/a", "/c")))
     assert error == (
         "one.yaml:6:17: groups.front.topics[0].topic: the default output `/front/a` is also an input (line 6 of"
         " two.yaml), which makes a loop: choose another `output`"
-    )
-
-
-def test_one_topic_has_one_type_in_all_files(environ):
-    (error,) = errors(environ, one=FRONT, two=file(group("rear", "/a", "/c", kind="Imu")))
-    assert error == (
-        "two.yaml:6:27: groups.rear.topics[0].type: `/a` is `sensor_msgs/msg/Image` on line 6 of one.yaml, but a"
-        " topic has only one type"
-    )
-
-
-def test_one_topic_has_one_qos_in_all_files(environ):
-    rear = file(group("rear", "/a", "/c")).replace("Image}", "Image, qos: sensor_data}", 1)
-    (error,) = errors(environ, one=FRONT, two=rear)
-    assert error.startswith(
-        "two.yaml:6:55: groups.rear.topics[0].qos: `/a` has a different `qos` on line 6 of one.yaml: "
     )
 
 
