@@ -3,9 +3,9 @@
 Problems are the same with remaps, and shown where the file has the name.
 """
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias, TypeVar
 
 from syncrelay.config.document import Document
 from syncrelay.config.names import LONGEST_TOPIC
@@ -46,35 +46,13 @@ class NamesInFile:
     def written(self) -> tuple[str, ...]:
         """The names that `problems` resolves, each once."""
         names: dict[str, str] = {}
-        for _ in self._problems(lambda name: names.setdefault(name, name), None):
-            pass
+        _Graph(self, self.groups, lambda name: names.setdefault(name, name))
         return tuple(names)
 
     def problems(self, resolve: Resolve, *, groups: Collection[str]) -> tuple[Problem, ...]:
         """Return the conflicts between the resolved names of these groups, in the order of the file."""
-        return tuple(sorted(self._problems(resolve, groups), key=_place))
-
-    def _problems(self, resolve: Resolve, groups: Collection[str] | None) -> Iterator[Problem]:
-        chosen = [group for group in self.groups if groups is None or group.name in groups]
-        by_group = [self._topics(group, resolve) for group in chosen]
-        topics = [topic for of_group in by_group for topic in of_group]
-        for of_group in by_group:
-            yield from _repeated_inputs(of_group, self.document)
-        yield from _shared_topics(topics, self.document)
-        yield from _outputs(topics, self.document)
-        yield from _too_long(topics, self.document)
-        own = _own_topics(self.diagnostics, [group.name for group in chosen], resolve)
-        if self.node.lifecycle:
-            own[resolve(_TRANSITIONS)] = _OwnTopic("lifecycle_msgs/msg/TransitionEvent", "its transitions")
-        for group in chosen:
-            if group.options.manifest:
-                manifest = _manifest(group, self.document, self.node.absolute, resolve)
-                yield from _misnamed_manifest(manifest, own, topics, self.document)
-                own.setdefault(manifest.text, _OwnTopic(MANIFEST_TYPE, f"the manifest of the group {group.name}"))
-        yield from _meeting_own_topics(topics, own, self.document)
-
-    def _topics(self, group: GroupConfig, resolve: Resolve) -> list["_Topic"]:
-        return [_topic(topic, path, self.document, self.node.absolute, resolve) for path, topic in group.paths()]
+        graph = _Graph(self, [group for group in self.groups if group.name in groups], resolve)
+        return tuple(sorted(graph.problems(), key=_place))
 
 
 def _place(problem: Problem) -> tuple[int, int, int]:
@@ -103,119 +81,22 @@ class _Name:
         """What a sentence adds to the name, or to its line."""
         return f", remapped from {quoted(self.before)}" if self.before else ""
 
-    def line(self, document: Document, *, beside: Path) -> str:
-        """Return the line that it comes from, for a sentence about what is at `beside`."""
-        return document.line(self.path, beside=beside) + self.remapped
+    @property
+    def excess(self) -> str:
+        """What a sentence says of a name that is too long; empty for others."""
+        length = len(self.text)
+        return f"has {length} characters, at most {LONGEST_TOPIC} are allowed" if length > LONGEST_TOPIC else ""
 
 
 @dataclass(frozen=True, slots=True)
 class _Topic:
-    """A topic of the file with its names in the graph."""
+    """A topic of the file with its names in the graph, and where its QoS is written, or else its name."""
 
     path: Path
     config: TopicConfig
     input: _Name
     output: _Name
-
-    @property
-    def has_own_output(self) -> bool:
-        """Whether the file names its output."""
-        return self.output.path[-1] == "output"
-
-
-def _topic(config: TopicConfig, path: Path, document: Document, absolute: Resolve, resolve: Resolve) -> _Topic:
-    def name(text: str, path: Path, *, known: bool) -> _Name:
-        if not text or not known:
-            return _Name("", path)
-        before, after = absolute(text), resolve(text)
-        return _Name(after, path, before if before != after else "")
-
-    topic, output = (*path, "topic"), (*path, "output")
-    if document.has(output):
-        output_is_known = output not in document.faulty
-    else:
-        output_is_known = bool(config.topic) and (*path[:2], "output_prefix") not in document.faulty
-        output = topic
-    return _Topic(
-        path,
-        config,
-        name(config.topic, topic, known=True),
-        name(config.output, output, known=output_is_known),
-    )
-
-
-def _repeated_inputs(topics: Sequence[_Topic], document: Document) -> Iterator[Problem]:
-    first: dict[str, _Name] = {}
-    for name in (topic.input for topic in topics if topic.input.text):
-        other = first.setdefault(name.text, name)
-        if other is not name:
-            text = f"{name.said} is in this group twice, first on {other.line(document, beside=name.path)}"
-            yield document.problem(name.path, text, code="repeated_topic")
-
-
-def _shared_types(topics: Sequence[_Topic], document: Document) -> Iterator[Problem]:
-    first: dict[str, tuple[Path, str]] = {}
-    for topic in topics:
-        path, type_name = (*topic.path, "type"), topic.config.type
-        if not topic.input.text or type_name is None or not document.has(path):
-            continue
-        other, others = first.setdefault(topic.input.text, (path, type_name))
-        if type_name != others:
-            line = document.line(other, beside=path)
-            text = f"{topic.input.said} is {quoted(others)} on {line}, but a topic has only one type"
-            yield document.problem(path, text, code="conflict")
-
-
-def _shared_topics(topics: Sequence[_Topic], document: Document) -> Iterator[Problem]:
-    yield from _shared_types(topics, document)
-    first: dict[str, _Topic] = {}
-    for topic in topics:
-        other = first.setdefault(topic.input.text, topic) if topic.input.text else topic
-        if other is topic:
-            continue
-        qos, others = _qos(topic, document), _qos(other, document)
-        if topic.config.qos != other.config.qos and not {qos, others} & document.faulty:
-            text = (
-                f"{topic.input.said} has a different `qos` on {document.line(others, beside=qos)}: there is one"
-                " subscription for both, write the same `qos`"
-            )
-            yield document.problem(qos, text, code="conflict")
-
-
-def _qos(topic: _Topic, document: Document) -> Path:
-    """Return where a topic's QoS is written; its name where it is not."""
-    path = (*topic.path, "qos")
-    return path if document.has(path) else topic.input.path
-
-
-def _outputs(topics: Sequence[_Topic], document: Document) -> Iterator[Problem]:
-    inputs = {topic.input.text: topic.input for topic in reversed(topics) if topic.input.text}
-    first: dict[str, _Name] = {}
-    for topic in topics:
-        name = topic.output
-        if not name.text:
-            continue
-        what = f"the output {name.said}" if topic.has_own_output else f"the default output {name.said}"
-        other = first.setdefault(name.text, name)
-        if name.text in inputs:
-            line = inputs[name.text].line(document, beside=name.path)
-            text = f"{what} is also an input ({line}), which makes a loop: choose another `output`"
-            yield document.problem(name.path, text, code="loop")
-        elif other is not name:
-            text = f"{what} is already used on {other.line(document, beside=name.path)}: choose another `output`"
-            yield document.problem(name.path, text, code="repeated_output")
-
-
-def _too_long(topics: Sequence[_Topic], document: Document) -> Iterator[Problem]:
-    """Yield names that are too long with their namespace or prefix."""
-    for name in (name for topic in topics for name in (topic.input, topic.output)):
-        if len(name.text) > LONGEST_TOPIC:
-            text = f"the full name {quoted(name.text)} has {_too_many_characters(name)}"
-            yield document.problem(name.path, text, code="bad_value")
-
-
-def _too_many_characters(name: _Name) -> str:
-    return f"{len(name.text)} characters, at most {LONGEST_TOPIC} are allowed"
+    qos: Path
 
 
 class _OwnTopic(NamedTuple):
@@ -232,57 +113,145 @@ _OF_EVERY_NODE: Final = {
 }
 
 
-def _own_topics(diagnostics: DiagnosticsConfig | None, groups: Sequence[str], resolve: Resolve) -> dict[str, _OwnTopic]:
-    own = {resolve(name): topic for name, topic in _OF_EVERY_NODE.items()}
-    if diagnostics is not None:
-        own[resolve(DIAGNOSTICS)] = _OwnTopic("diagnostic_msgs/msg/DiagnosticArray", "its diagnostics")
-    if diagnostics is not None and diagnostics.scalars:
-        for group in groups:
+def _own_topics(file: NamesInFile, groups: Sequence[GroupConfig]) -> Iterator[tuple[str, _OwnTopic]]:
+    """Yield the node's own topics but the manifests, by their names in the file."""
+    yield from _OF_EVERY_NODE.items()
+    if file.diagnostics is not None:
+        yield DIAGNOSTICS, _OwnTopic("diagnostic_msgs/msg/DiagnosticArray", "its diagnostics")
+    if file.diagnostics is not None and file.diagnostics.scalars:
+        for name in (group.name for group in groups):
             for figure in SCALARS:
-                purpose = f"`{figure}` of the group {group}"
-                own[resolve(f"~/{group}/{figure}")] = _OwnTopic("std_msgs/msg/Float64", purpose)
-    return own
+                yield f"~/{name}/{figure}", _OwnTopic("std_msgs/msg/Float64", f"`{figure}` of the group {name}")
+    if file.node.lifecycle:
+        yield _TRANSITIONS, _OwnTopic("lifecycle_msgs/msg/TransitionEvent", "its transitions")
 
 
-def _manifest(group: GroupConfig, document: Document, absolute: Resolve, resolve: Resolve) -> _Name:
-    name, path = manifest_topic(group.name), (*group.path, "manifest")
-    before, after = absolute(name), resolve(name)
-    return _Name(after, path if document.has(path) else group.path, before if before != after else "")
+_Named = TypeVar("_Named")
 
 
-def _misnamed_manifest(
-    name: _Name, own: dict[str, _OwnTopic], topics: Sequence[_Topic], document: Document
-) -> Iterator[Problem]:
-    """Yield what is wrong with the name of a manifest: its length, what else it names."""
-    span = document.value_span(name.path) if name.path[-1] == "manifest" else document.key_span(name.path)
-    instead = "remap it to another name, or set `manifest: false`"
-    if len(name.text) > LONGEST_TOPIC:
-        text = f"the full name of its manifest, {quoted(name.text)}, has {_too_many_characters(name)}"
-        yield document.problem(name.path, text, code="bad_value", span=span)
-    taken = own.get(name.text)
-    if taken is not None:
-        text = f"its manifest {name.said} is a topic that the node itself uses for {taken.purpose}: {instead}"
-        yield document.problem(name.path, text, code="own_topic", span=span)
-    for topic in topics:
-        if topic.input.text == name.text and topic.config.type in (None, MANIFEST_TYPE):
-            text = f"{topic.input.said} is the manifest of a group of the same node, which makes a loop"
-            yield document.problem(topic.input.path, text, code="loop")
+def _repeats(named: Iterable[tuple[str, _Named]]) -> Iterator[tuple[_Named, _Named]]:
+    """Yield what has a name that something before it has, with the first that has it. An empty name is none."""
+    first: dict[str, _Named] = {}
+    for name, each in named:
+        if name and first.setdefault(name, each) is not each:
+            yield each, first[name]
 
 
-def _meeting_own_topics(topics: Sequence[_Topic], own: dict[str, _OwnTopic], document: Document) -> Iterator[Problem]:
-    """Yield outputs onto the node's own topics, and inputs that make another type of one: DDS refuses both."""
-    for topic in topics:
-        taken = own.get(topic.output.text)
-        if taken is not None:
+class _Graph:
+    """The names of some groups, and of the node's own topics, as they are in the graph."""
+
+    def __init__(self, file: NamesInFile, groups: Sequence[GroupConfig], resolve: Resolve) -> None:
+        self._document, self._absolute, self._resolve = file.document, file.node.absolute, resolve
+        self._by_group = [[self._topic(topic, path) for path, topic in group.paths()] for group in groups]
+        self._topics = [topic for topics in self._by_group for topic in topics]
+        self._manifests = {group.name: self._manifest(group) for group in groups if group.options.manifest}
+        self._own = {resolve(name): topic for name, topic in _own_topics(file, groups)}
+
+    def problems(self) -> Iterator[Problem]:
+        yield from self._shared_inputs()
+        yield from self._outputs()
+        for name in (name for topic in self._topics for name in (topic.input, topic.output)):
+            if name.excess:
+                yield self._problem(name.path, f"the full name {quoted(name.text)} {name.excess}", code="bad_value")
+        for group, manifest in self._manifests.items():
+            yield from self._misnamed_manifest(manifest)
+            self._own.setdefault(manifest.text, _OwnTopic(MANIFEST_TYPE, f"the manifest of the group {group}"))
+        for topic in self._topics:
+            yield from self._meeting_own_topics(topic)
+
+    def _name(self, text: str, path: Path) -> _Name:
+        before, after = self._absolute(text), self._resolve(text)
+        return _Name(after, path, before if before != after else "")
+
+    def _topic(self, config: TopicConfig, path: Path) -> _Topic:
+        topic, output, qos = ((*path, key) for key in ("topic", "output", "qos"))
+        is_named = self._document.has(output)
+        # A default output is known if what it is made of is.
+        needed = output if is_named else (*path[:2], "output_prefix")
+        is_known = bool(config.topic or is_named) and needed not in self._document.faulty
+        written = output if is_named else topic
+        return _Topic(
+            path,
+            config,
+            input=self._name(config.topic, topic) if config.topic else _Name("", topic),
+            output=self._name(config.output, written) if is_known and config.output else _Name("", written),
+            qos=qos if self._document.has(qos) else topic,
+        )
+
+    def _manifest(self, group: GroupConfig) -> _Name:
+        path = (*group.path, "manifest")
+        return self._name(manifest_topic(group.name), path if self._document.has(path) else group.path)
+
+    def _problem(self, path: Path, text: str, *, code: str) -> Problem:
+        return self._document.problem(path, text, code=code)
+
+    def _line(self, name: _Name, *, beside: Path) -> str:
+        """Return the line that a name comes from, for a sentence about what is at `beside`."""
+        return self._document.line(name.path, beside=beside) + name.remapped
+
+    def _shared_inputs(self) -> Iterator[Problem]:
+        """Yield inputs that a group has twice, and those that differ where all groups share a subscription."""
+        for topics in self._by_group:
+            for name, first in _repeats((topic.input.text, topic.input) for topic in topics):
+                text = f"{name.said} is in this group twice, first on {self._line(first, beside=name.path)}"
+                yield self._problem(name.path, text, code="repeated_topic")
+        typed = [topic for topic in self._topics if topic.config.type and self._document.has((*topic.path, "type"))]
+        for topic, other in _repeats((topic.input.text, topic) for topic in typed):
+            path, types = (*topic.path, "type"), (topic.config.type, str(other.config.type))
+            if types[0] != types[1]:
+                line = self._document.line((*other.path, "type"), beside=path)
+                text = f"{topic.input.said} is {quoted(types[1])} on {line}, but a topic has only one type"
+                yield self._problem(path, text, code="conflict")
+        for topic, other in _repeats((topic.input.text, topic) for topic in self._topics):
+            if topic.config.qos != other.config.qos and not {topic.qos, other.qos} & self._document.faulty:
+                text = (
+                    f"{topic.input.said} has a different `qos` on {self._document.line(other.qos, beside=topic.qos)}:"
+                    " there is one subscription for both, write the same `qos`"
+                )
+                yield self._problem(topic.qos, text, code="conflict")
+
+    def _outputs(self) -> Iterator[Problem]:
+        inputs = {topic.input.text: topic.input for topic in reversed(self._topics)}
+        first: dict[str, _Name] = {}
+        for name in (topic.output for topic in self._topics if topic.output.text):
+            what = f"the {'' if name.path[-1] == 'output' else 'default '}output {name.said}"
+            other = first.setdefault(name.text, name)
+            if name.text in inputs:
+                line = self._line(inputs[name.text], beside=name.path)
+                text = f"{what} is also an input ({line}), which makes a loop: choose another `output`"
+                yield self._problem(name.path, text, code="loop")
+            elif other is not name:
+                line = self._line(other, beside=name.path)
+                text = f"{what} is already used on {line}: choose another `output`"
+                yield self._problem(name.path, text, code="repeated_output")
+
+    def _misnamed_manifest(self, name: _Name) -> Iterator[Problem]:
+        """Yield what is wrong with the name of a manifest: its length, what else it names."""
+        span = (self._document.value_span if name.path[-1] == "manifest" else self._document.key_span)(name.path)
+        instead = "remap it to another name, or set `manifest: false`"
+        if name.excess:
+            text = f"the full name of its manifest, {quoted(name.text)}, {name.excess}"
+            yield self._document.problem(name.path, text, code="bad_value", span=span)
+        if (taken := self._own.get(name.text)) is not None:
+            text = f"its manifest {name.said} is a topic that the node itself uses for {taken.purpose}: {instead}"
+            yield self._document.problem(name.path, text, code="own_topic", span=span)
+        for topic in self._topics:
+            if topic.input.text == name.text and topic.config.type in (None, MANIFEST_TYPE):
+                text = f"{topic.input.said} is the manifest of a group of the same node, which makes a loop"
+                yield self._problem(topic.input.path, text, code="loop")
+
+    def _meeting_own_topics(self, topic: _Topic) -> Iterator[Problem]:
+        """Yield an output onto one of the node's own topics, or another type of one: DDS refuses both."""
+        if (taken := self._own.get(topic.output.text)) is not None:
             text = (
                 f"the output {topic.output.said} is a topic that the node itself uses for {taken.purpose}:"
                 " choose another `output`"
             )
-            yield document.problem(topic.output.path, text, code="own_topic")
-        taken = own.get(topic.input.text)
+            yield self._problem(topic.output.path, text, code="own_topic")
+        taken = self._own.get(topic.input.text)
         if taken is not None and topic.config.type not in (None, taken.type):
             text = (
                 f"{topic.input.said} is a topic that the node itself uses for {taken.purpose}, with the type"
                 f" `{taken.type}`: a topic has only one type"
             )
-            yield document.problem((*topic.path, "type"), text, code="conflict")
+            yield self._problem((*topic.path, "type"), text, code="conflict")
