@@ -23,7 +23,7 @@ from syncrelay.config.partial import partial_file
 from syncrelay.config.problems import ConfigError, Path, Problem, Severity
 from syncrelay.config.resolved import GroupConfig, resolve_groups, resolve_listen
 from syncrelay.config.sections import DiagnosticsConfig, NodeConfig
-from syncrelay.config.source import PATIENCE_S, Patience, Source, check_text, listed, read_source
+from syncrelay.config.source import PATIENCE_S, Source, check_text, listed, read_source
 from syncrelay.config.translate import translate
 from syncrelay.config.typechecks import check_types
 from syncrelay.config.yaml_tree import compose
@@ -64,18 +64,17 @@ def load(
 ) -> Config:
     """Read a file (`-` is standard input), or several files or directories as one configuration.
 
-    Together they have the groups of all and one `node`; `defaults` are for the groups of their own file. All pipes
-    together are waited for so many seconds. Raises ConfigError with everything that is wrong.
+    Together they have the groups of all and one `node`; `defaults` are for the groups of their own file. A pipe
+    is waited for so many seconds. Raises ConfigError with everything that is wrong.
     """
     reads: list[Callable[[], Source]] = []
-    patience = Patience(patience_s)
     for path in paths:
         try:
             files = listed(path)
         except ConfigError as error:
             reads.append(partial(_refuse, error))
         else:
-            reads += [partial(read_source, file, patience=patience) for file in files]
+            reads += [partial(read_source, file, patience_s=patience_s) for file in files]
     return _config(_parts(reads, environ), environ)
 
 

@@ -34,14 +34,6 @@ _BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ud800-\udfff\ufffe\uffff]")
 
 
-@dataclass(slots=True)
-class Patience:
-    """How many seconds all pipes of one command may take together, and how many have passed."""
-
-    seconds: float = PATIENCE_S
-    waited: float = 0.0
-
-
 @dataclass(frozen=True, slots=True)
 class Source:
     """A file's name as the user gave it, its text and its lines; `index` is its place among files read together."""
@@ -87,20 +79,19 @@ def listed(path: str) -> tuple[str, ...]:
     return files
 
 
-def read_source(path: str, *, patience: Patience | None = None) -> Source:
+def read_source(path: str, *, patience_s: float = PATIENCE_S) -> Source:
     """Return the text of a file, `-` for standard input, which alone is waited for without end.
 
-    A pipe has the patience that is left, by default PATIENCE_S. Raises ConfigError where there is no text.
+    A pipe is waited for so many seconds. Raises ConfigError where there is no text.
     """
-    patience = patience or Patience()
     if path == STDIN:
         return decode(sys.stdin.buffer.read(_MOST_BYTES + 1), name=shown_name(path))
     if not path:
         raise _unreadable(shown_name(path), "is not a file name")
     try:
-        content = _content(path, patience)
+        content = _content(path, patience_s)
     except TimeoutError as error:
-        late = f"could not be read to its end within {patience.seconds:g} s"
+        late = f"could not be read to its end within {patience_s:g} s"
         raise _unreadable(path, f"{late}: is it a pipe that nobody writes to, or closes?") from error
     except OSError as error:
         raise _unreadable(path, _reason(path, error)) from error
@@ -109,7 +100,7 @@ def read_source(path: str, *, patience: Patience | None = None) -> Source:
     return decode(content, name=path)
 
 
-def _content(path: str, patience: Patience) -> bytes:
+def _content(path: str, patience_s: float) -> bytes:
     """Return a file's bytes, at most one more than allowed. Raises TimeoutError for a pipe that does not end."""
     kind = _NO_FILES.get(stat.S_IFMT(Path(path).stat().st_mode))
     if kind is not None:
@@ -117,18 +108,15 @@ def _content(path: str, patience: Patience) -> bytes:
         raise _unreadable(path, f"is a {kind}, expected a YAML file")
     # A blocking open of a FIFO waits for a writer, without a limit.
     with FileIO(path, opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
-        return _read(file, patience)
+        return _read(file, until=time.monotonic() + patience_s)
 
 
-def _read(file: FileIO, patience: Patience) -> bytes:
+def _read(file: FileIO, *, until: float) -> bytes:
     waiting = select.poll()
     waiting.register(file, select.POLLIN)
     content = bytearray()
     while len(content) <= _MOST_BYTES:
-        began = time.monotonic()
-        ready = waiting.poll(max(0.0, patience.seconds - patience.waited) * 1000)
-        patience.waited += time.monotonic() - began
-        if not ready:
+        if not waiting.poll(max(0.0, until - time.monotonic()) * 1000):
             raise TimeoutError
         chunk = file.read(_MOST_BYTES + 1 - len(content))
         if chunk == b"":

@@ -2,7 +2,6 @@
 
 import os
 import socket
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -11,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from syncrelay.config import ConfigError, load
-from syncrelay.config.source import Patience, read_source
 
 GOOD = """\
 version: 1
@@ -50,36 +48,6 @@ def text_of(path: Path | str, *, patience_s: float = 0.2) -> str:
 
 def test_a_pipe_that_nobody_writes_to_is_given_up(fifo: Path):
     assert text_of(fifo) == f"{fifo}: {_NO_END}"
-
-
-def test_pipes_that_are_read_together_are_waited_for_together(tmp_path: Path):
-    """They are given up one after another, without a wait for each; what is written to others is read all the same."""
-    patience = Patience(0.2)
-    for number in range(20):
-        os.mkfifo(tmp_path / f"{number}.yaml")
-        with pytest.raises(ConfigError, match=r"within 0\.2 s"):
-            read_source(str(tmp_path / f"{number}.yaml"), patience=patience)
-        assert patience.waited >= 0.2
-    read_end, written = os.pipe()
-    os.write(written, b"version: 1")
-    os.close(written)
-    assert read_source(f"/dev/fd/{read_end}", patience=patience).text == "version: 1"
-    os.close(read_end)
-
-
-def test_a_directory_of_pipes_is_given_up_after_one_wait(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    begun: list[float] = []
-
-    def patience(seconds: float) -> Patience:
-        begun.append(seconds)
-        return Patience(seconds)
-
-    for module in ("load", "source"):
-        monkeypatch.setattr(sys.modules[f"syncrelay.config.{module}"], "Patience", patience)
-    for number in range(20):
-        os.mkfifo(tmp_path / f"{number:02}.yaml")
-    assert text_of(tmp_path).count(_NO_END) == 20
-    assert begun == [0.2]
 
 
 @pytest.mark.parametrize("content", ["", GOOD])

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 from syncrelay.config import ConfigError, GroupConfig, Problem
 from syncrelay.config.problems import Path
-from syncrelay.config.source import Patience, listed, shown_name
+from syncrelay.config.source import listed, shown_name
 from syncrelay.errors import SyncRelayError
 from syncrelay.explain import UNREADABLE, Code, Distribution, EngineDriver
 from syncrelay.recordings.analysis.evaluation import Evaluation, evaluate
@@ -70,7 +70,6 @@ class Ran(NamedTuple):
 
 def run_files(paths: Sequence[str]) -> Iterator[Ran]:
     """Run the cases of test files, or of all files of a directory."""
-    patience = Patience()
     for path in paths:
         try:
             files = listed(path)
@@ -79,7 +78,7 @@ def run_files(paths: Sequence[str]) -> Iterator[Ran]:
             continue
         for file in files:
             try:
-                suite = load_suite(file, patience=patience)
+                suite = load_suite(file)
             except ConfigError as error:
                 yield Ran(shown_name(file), error.problems)
             else:

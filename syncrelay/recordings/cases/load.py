@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from syncrelay.config import Config, ConfigError, GroupConfig, Problem, Severity, Span, load
 from syncrelay.config.document import Document, plain
 from syncrelay.config.problems import Path as Place
-from syncrelay.config.source import STDIN, Patience, Source, check_text, read_source
+from syncrelay.config.source import STDIN, Source, check_text, read_source
 from syncrelay.config.translate import Form, translate
 from syncrelay.config.wording import all_of, describe, one_of, quoted
 from syncrelay.config.yaml_tree import MOST_PROBLEMS, compose, too_many
@@ -64,12 +64,12 @@ class Suite:
     cases: tuple[LoadedCase, ...]
 
 
-def load_suite(path: str, *, environ: Mapping[str, str] = os.environ, patience: Patience | None = None) -> Suite:
+def load_suite(path: str, *, environ: Mapping[str, str] = os.environ) -> Suite:
     """Read a test file, `-` for standard input. Raises ConfigError with everything that is wrong.
 
     A pipe is read as by read_source.
     """
-    return _suite(read_source(path, patience=patience), Path(path).parent if path != "-" else Path(), environ)
+    return _suite(read_source(path), Path(path).parent if path != "-" else Path(), environ)
 
 
 def load_suite_text(text: str, *, name: str, environ: Mapping[str, str] = os.environ) -> Suite:
