@@ -6,11 +6,11 @@ from typing import Final
 
 from syncrelay.config.document import Document, SequenceNode
 from syncrelay.config.export import ACTION, ExportKeys, ExportSource, LerobotKeys, TaskTopic, sources_of
-from syncrelay.config.interfaces import PRIMITIVES, Interfaces
+from syncrelay.config.interfaces import PRIMITIVES
 from syncrelay.config.problems import Path, Problem
 from syncrelay.config.resolved import GroupConfig
 from syncrelay.config.sections import NodeConfig
-from syncrelay.config.typechecks import Wanted, check_field
+from syncrelay.config.typechecks import TypeChecks, Wanted
 from syncrelay.config.wording import all_of, one_of, or_nearest, quoted
 
 IMAGES: Final = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
@@ -29,11 +29,11 @@ def check_export(
     node: NodeConfig,
     groups: Sequence[GroupConfig],
     document: Document,
-    interfaces: Interfaces | None,
+    types: TypeChecks | None,
 ) -> Iterator[Problem]:
     """Yield conflicts between the keys of `export`, and between them and the groups.
 
-    Fields are looked for in types that the file names, where `interfaces` has them.
+    Fields are looked for in the types that the file names, where `types` can be checked.
     """
     lerobot = None if keys is None else keys.lerobot
     if lerobot is None:
@@ -41,7 +41,7 @@ def check_export(
     yield from _features(lerobot, document)
     chosen = [group for group in groups if lerobot.group in (None, group.name)]
     if len(chosen) == 1:
-        yield from _Sources(lerobot, node, chosen[0], document, interfaces).problems()
+        yield from _Sources(lerobot, node, chosen[0], document, types).problems()
     elif groups and (*_PATH, "group") not in document.faulty:
         yield _group(lerobot, [group.name for group in groups], document)
 
@@ -79,7 +79,7 @@ class _Sources:
     node: NodeConfig
     group: GroupConfig
     document: Document
-    interfaces: Interfaces | None
+    types: TypeChecks | None
 
     def problems(self) -> Iterator[Problem]:
         task = self.lerobot.task
@@ -109,7 +109,5 @@ class _Sources:
             if filled_in := self.document.filled_in(field):
                 text = f"expected a topic of images, or TOPIC:FIELD, found {filled_in}"
             yield self.document.problem(field, text, code="no_such_field", subject=type_name)
-        elif type_name is not None and source.field is not None and self.interfaces is not None:
-            yield from check_field(
-                type_name, field, source.field, wanted, document=self.document, interfaces=self.interfaces
-            )
+        elif type_name is not None and source.field is not None and self.types is not None:
+            yield from self.types.of_field(type_name, field, source.field, wanted)

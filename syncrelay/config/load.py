@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final
@@ -25,7 +25,7 @@ from syncrelay.config.resolved import GroupConfig, resolve_groups, resolve_liste
 from syncrelay.config.sections import DiagnosticsConfig, NodeConfig
 from syncrelay.config.source import PATIENCE_S, Source, check_text, listed, read_source
 from syncrelay.config.translate import translate
-from syncrelay.config.typechecks import check_types
+from syncrelay.config.typechecks import TypeChecks
 from syncrelay.config.yaml_tree import compose
 
 _LEAST: Final = "at least `version: 1` and `groups:`"
@@ -121,8 +121,13 @@ def _config(parts: Sequence[_Part], environ: Mapping[str, str]) -> Config:
     problems += check_groups(groups, document)
     problems += names.problems(file.node.absolute, groups=file.groups)
     interfaces = Interfaces.find(environ)
-    problems += _types(groups, document, interfaces)
-    problems += check_export(file.export, file.node, groups, document, interfaces)
+    types = TypeChecks(document, interfaces) if interfaces is not None else None
+    if types is not None:
+        problems += types.of_groups(groups)
+    else:
+        first = document.sources[0]
+        problems.append(first.problem(_NO_INDEX, code="not_checked", span=None, severity=Severity.NOTE))
+    problems += check_export(file.export, file.node, groups, document, types)
     found = _in_order(problems, files=[source.name for source in document.sources.values()])
     if document.faulty or any(problem.severity is Severity.ERROR for problem in found):
         raise ConfigError(found)
@@ -167,14 +172,6 @@ def _known(faults: Sequence[ErrorDetails]) -> list[ErrorDetails]:
         fault["loc"][:2] for fault in faults if fault["type"] == "value_error" and fault["loc"][3:] == ("policy",)
     }
     return [fault for fault in faults if fault["type"] != "extra_forbidden" or fault["loc"][:2] not in refused]
-
-
-def _types(groups: Sequence[GroupConfig], document: Document, interfaces: Interfaces | None) -> Iterator[Problem]:
-    if interfaces is None:
-        first = document.sources[0]
-        yield first.problem(_NO_INDEX, code="not_checked", span=None, severity=Severity.NOTE)
-        return
-    yield from check_types(groups, document, interfaces)
 
 
 def _in_order(problems: Iterable[Problem], *, files: Iterable[str]) -> tuple[Problem, ...]:
