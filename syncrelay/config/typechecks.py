@@ -56,7 +56,7 @@ class TypeChecks:
             yield from self._restamp(group)
 
     def of_field(self, type_name: str, path: Path, steps: str, wanted: Wanted) -> Iterator[Problem]:
-        """Yield what is wrong with the field that the file names at `path`; of a type without its .msg file, nothing."""
+        """Yield what is wrong with the field that the file names at `path`; nothing of a type without its .msg file."""
         text = self._field_fault(type_name, (), steps.split("."), wanted)
         if text is not None:
             if filled_in := self.document.filled_in(path):

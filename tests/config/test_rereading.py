@@ -118,40 +118,27 @@ def test_what_reading_raises_is_raised_where_the_file_is_wanted(files: ConfigFil
 
 
 @pytest.mark.usefixtures("soon")
-def test_each_of_several_files_is_watched(path: Path):
-    other = path.with_name("other.yaml")
-    other.write_text("version: 1\n")
-    with ConfigFiles([str(path), str(other)], watched=True) as files:
-        replace(other, OTHER)
-        assert names(taken(files)) == ["front", "rear"]
-        replace(path, GOOD.replace("front", "left"))
-        assert names(taken(files)) == ["left", "rear"]
-        other.unlink()
-        with pytest.raises(ConfigError, match=r"other.yaml: no such file"):
-            taken(files).result()
-        replace(other, OTHER)
-        assert names(taken(files)) == ["left", "rear"]
-        replace(path, GOOD)
-        assert names(taken(files)) == ["front", "rear"]
-
-
-@pytest.mark.usefixtures("soon")
-def test_files_that_come_to_a_watched_directory_change_in_it_and_go_are_seen(path: Path):
+@pytest.mark.parametrize("is_folder", [False, True], ids=["files", "directory"])
+def test_files_that_come_change_and_go_are_seen_whether_each_is_named_or_their_directory(path: Path, is_folder):
     folder = path.parent / "conf"
     folder.mkdir()
-    path.replace(folder / "front.yaml")
-    with ConfigFiles([str(folder)], watched=True) as files:
-        replace(folder / "rear.yaml", OTHER)
+    front, rear = folder / "front.yaml", folder / "rear.yaml"
+    path.replace(front)
+    gone = r"no \*.yaml or \*.yml file in this directory" if is_folder else r"front.yaml: no such file"
+    rear.write_text("version: 1\n")
+    with ConfigFiles([str(folder)] if is_folder else [str(front), str(rear)], watched=True) as files:
+        replace(rear, OTHER)
         assert names(taken(files)) == ["front", "rear"]
-        replace(folder / "rear.yaml", GOOD.replace("front", "left"))
-        assert names(taken(files)) == ["front", "left"]
-        (folder / "front.yaml").unlink()
-        assert names(taken(files)) == ["left"]
-        (folder / "rear.yaml").unlink()
-        with pytest.raises(ConfigError, match=r"no \*.yaml or \*.yml file in this directory"):
+        replace(front, GOOD.replace("front", "left"))
+        assert names(taken(files)) == ["left", "rear"]
+        if is_folder:
+            rear.unlink()
+            assert names(taken(files)) == ["left"]
+        front.unlink()
+        with pytest.raises(ConfigError, match=gone):
             taken(files).result()
-        replace(folder / "front.yaml", GOOD)
-        assert names(taken(files)) == ["front"]
+        replace(front, GOOD)
+        assert names(taken(files)) == (["front"] if is_folder else ["front", "rear"])
 
 
 class _Writer:

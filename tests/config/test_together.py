@@ -133,12 +133,3 @@ def test_everything_wrong_with_all_files_is_told_at_once(environ):
         "two.yaml:3:3: groups.front: the group `front` is also on line 3 of one.yaml: rename one of them",
         "two.yaml:4:13: groups.front.policy: unknown value `exakt_time`, did you mean `exact_time`?",
     ]
-
-
-def test_notes_name_their_file(environ):
-    opaque = file(group("rear", "/c", "/d")).replace("sensor_msgs/msg/Image", "other_msgs/msg/Image", 1)
-    Path("one.yaml").write_text(FRONT)
-    Path("two.yaml").write_text(opaque)
-    (note,) = load("one.yaml", "two.yaml", environ=environ).notes
-    assert note.span is not None
-    assert (note.file, note.span.line, note.source) == ("two.yaml", 6, opaque.splitlines()[5])

@@ -3,19 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from syncrelay.config import (
-    DiagnosticsConfig,
-    ExportFeature,
-    ExportSource,
-    LerobotConfig,
-    Listen,
-    QosOverrides,
-    QosPreset,
-    Severity,
-    load,
-    load_text,
-)
-from syncrelay.config.models import StampField
+from syncrelay.config import Listen, QosOverrides, Severity, load, load_text
 from syncrelay.sync import Restamp, Ticks
 
 FOLDER = Path(__file__).parent / "valid"
@@ -31,52 +19,6 @@ def test_a_file_in_order_loads_without_a_note(file, environ):
 def test_every_example_is_in_order(file):
     config = load(str(file), environ={})
     assert {note.code for note in config.notes} <= {"not_checked"}
-
-
-def test_every_key_arrives_where_it_is_used(environ):
-    config = load(str(FOLDER / "all_keys.yaml"), environ=environ)
-    assert (config.node.name, config.node.namespace, config.node.use_sim_time) == ("fusion", "/robot1", True)
-    hosts = ("robot.lab.example", "10.0.0.5", "fd00::1", "10.0.0.6")
-    assert config.listen == Listen("127.0.0.1", range(9500, 9501), hosts=hosts)
-    assert config.diagnostics == DiagnosticsConfig(scalars=True)
-    front, back = config.groups
-    assert (front.name, back.name) == ("front", "back")
-    assert front.restamp == 1
-    assert back.restamp is Restamp.LATEST
-    image, points, dock, chatter = front.topics
-    assert (image.topic, image.type) == ("/camera/image_raw", "sensor_msgs/msg/Image")
-    assert (image.offset_ns, image.min_period_ns) == (-12_000_000, 0)
-    assert image.qos == QosPreset("sensor_data")
-    assert image.stamp == "header"
-    assert (points.offset_ns, points.min_period_ns) == (0, 90_000_000)
-    assert points.qos == QosOverrides(
-        history="keep_last",
-        depth=7,
-        reliability="best_effort",
-        durability="volatile",
-        deadline="1.5s",  # type: ignore[arg-type]  # as a file has it
-        lifespan="2s",  # type: ignore[arg-type]  # and this
-        liveliness="automatic",
-        liveliness_lease_duration="500ms",  # type: ignore[arg-type]  # and this
-        avoid_ros_namespace_conventions=False,
-    )
-    assert isinstance(dock.stamp, StampField)
-    assert dock.stamp.field == "trigger.time"
-    assert chatter.stamp == "receive"
-    assert back.topics[0].qos == QosOverrides() == back.topics[1].qos
-    covariance = ExportSource("/back/imu", "orientation_covariance")
-    assert config.lerobot == LerobotConfig(
-        group="back",
-        fps=10,
-        task=ExportSource("/back/task", "name"),
-        max_gap_ns=300_000_000,
-        keeps_incomplete=True,
-        features=(
-            ExportFeature("observation.images.back", (ExportSource("/back/image", None),)),
-            ExportFeature("observation.state", (covariance, ExportSource("/back/image", "height"))),
-            ExportFeature("action", (covariance,)),
-        ),
-    )
 
 
 def test_a_trigger_is_a_clock_where_it_is_a_rate(environ):
