@@ -1,4 +1,4 @@
-"""A real Chromium, without a screen."""
+"""A real Chromium, headless."""
 
 import shutil
 from collections.abc import Iterator
@@ -9,14 +9,14 @@ import pytest
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install '.[test]'")
 
 _CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-# Two tests may share one core with as many others; none takes a second alone.
+# Alone, no test takes a second; two may share a core with other tests.
 _PATIENCE_MS = 120_000
 
 needs_chromium = pytest.mark.skipif(_CHROMIUM is None, reason="there is no chromium: apt-get install chromium")
 
 
 class Opened:
-    """A page, what it asked for, and what it complained of."""
+    """A page, the URLs that it requested, and its console messages and errors."""
 
     def __init__(self, page) -> None:
         self.page = page

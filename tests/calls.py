@@ -1,11 +1,11 @@
-"""Work counted in calls, of Python as of C: what takes hours takes many, however fast the machine is."""
+"""Counts the calls of Python and C functions: a measure of work that does not depend on the machine."""
 
 import sys
 from typing import Any, Self
 
 
 class Calls:
-    """Counts the calls that are made while it is entered."""
+    """Counts the calls within its context."""
 
     def __init__(self) -> None:
         self.count = 0

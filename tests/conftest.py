@@ -1,4 +1,4 @@
-"""What a machine lacks is skipped with the reason; what a test with ROS needs, it has for itself alone."""
+"""Skips tests for which this machine lacks something, and gives each test with ROS a domain of its own."""
 
 import gc
 import importlib.metadata
@@ -20,7 +20,7 @@ _REAL_DATA = "SYNCRELAY_REAL_DATA"
 _FIGURES = "figures"
 
 
-# No verdict that a slow machine could change, and the same examples in every run, but for the long form, which hunts.
+# No deadline, so that a slow machine does not fail; the same examples in every run, except in the long form.
 _any = settings(deadline=None, database=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("long", _any, max_examples=400, print_blob=True)
 settings.register_profile("short", _any, max_examples=25, derandomize=True)
@@ -30,7 +30,7 @@ settings.register_profile("quick", _any, max_examples=10, derandomize=True)
 
 def pytest_configure(config: pytest.Config) -> None:
     settings.load_profile(config.getoption("--hypothesis-profile") or chosen(short="short", long="long"))
-    # A shell that starts the tests in the background has them, and all that they start, ignore Ctrl-C.
+    # A shell that starts the tests in the background lets them, and all that they start, ignore Ctrl-C.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     named = os.environ.get(_REAL_DATA)
@@ -38,14 +38,14 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError(f"{_REAL_DATA}={named}: no such folder")
     others = sorted(entry.value for entry in importlib.metadata.entry_points(group="syncrelay.policies"))
     if others:
-        # They would be in the schema and on the pages that the tests compare with those in the repository.
+        # They would appear in the schema and pages that tests compare with those in the repository.
         raise pytest.UsageError(f"policies of other packages are installed here, uninstall them: {', '.join(others)}")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Spread the modules with ROS, which wait more than they compute, among the others; what takes a minute is first.
+    """Spread the modules with ROS, which wait more than they compute, among the others; tests of a minute come first.
 
-    Workers of pytest-xdist take stretches of this order: else one has all that waits, and at the end all cores rest.
+    Workers of pytest-xdist take consecutive tests: otherwise one of them gets all tests that wait.
     """
     modules = [list(module) for _, module in itertools.groupby(items, key=lambda item: item.path)]
     placed: list[tuple[float, list[pytest.Item]]] = []
@@ -60,7 +60,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    # What 7,000 tests are made of stays to the end: no collection need go through it again, a third of a second each.
+    # The objects of 7,000 tests live to the end; each collection would take a third of a second to visit them.
     gc.collect()
     gc.freeze()
 
@@ -102,7 +102,7 @@ def backend() -> str:
 
 @pytest.fixture
 def figures(record_property: Callable[[str, object], None]) -> Callable[[str], None]:
-    """Takes a line of figures, which are told when all tests have run."""
+    """Takes a line of figures, printed after all tests."""
     return lambda line: record_property(_FIGURES, line)
 
 

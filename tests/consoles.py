@@ -1,4 +1,4 @@
-"""Does what a page of docs/ says: writes its files, runs its console blocks in order, compares what it says comes.
+"""Follows a page of docs/: writes its files, runs its console blocks in order, and compares the output that it shows.
 
 A block that cannot be run, or a text that is not its output, has a comment before it: `<!-- not run: REASON -->`.
 """
@@ -24,19 +24,19 @@ _BLOCK: Final = re.compile(
 )
 _WRITTEN: Final = re.compile(r"\b[Ww]rite `([\w./]+\.yaml)`:$")
 _INTO_THE_FILE: Final = re.compile(r"\bwrite .* into the file, while the relay runs:$")
-# Words of a command behind which a file is written that may not be there yet.
+# Options whose value is a file that must not exist yet.
 _WRITES: Final = ("-o", "--output", "--write", "--record")
-# What exits with 1 where it found something.
+# Commands that exit with 1 if they found something.
 _MAY_FIND: Final = ("diff", "doctor", "observe", "test")
-# What is not run, and checked otherwise: tests/test_pages.py knows what may be installed.
+# Not run here: tests/test_pages.py checks what pages install.
 _INSTALLS: Final = ("pip",)
-# What needs nodes, or a running relay: `--config` alone is the relay.
+# Words of commands that need nodes or a running relay; a command of `--config` alone is the relay itself.
 _LIVE: Final = frozenset(
     ("--live", "--from-graph", "--url", "observe", "top", "tap", "reload", "--watch", "--ros-args")
 )
 _UNITS: Final = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0}
 _NUMBER: Final = re.compile(r"(:?)(?<![\w.])[-+]?(\d+(?:\.\d+)?)(?: ?(ns|us|ms|s|min|Hz|%|[kM]?B)\b)?")
-# A measured figure may be so many times another.
+# The largest factor between a shown and a measured figure.
 _LIKE: Final = 2.0
 _DEADLINE_S: Final = 90.0
 
@@ -72,10 +72,10 @@ def commands_of(block: Block) -> list[str]:
 
 
 def is_like(shown: str, found: str) -> bool:
-    """Whether a line is the one that is shown but for its figures.
+    """Whether a line is the shown one, except for measured figures.
 
-    A figure with a unit is about as large, one behind a colon, as a port is, the same; a count may be any. What follows
-    `...` at the end may be anything.
+    A figure with a unit may differ by the factor _LIKE, one after a colon, such as a port, must be equal, and a count
+    may be anything. A shown line that ends in `...` may go on in any way.
     """
     start = shown.removesuffix("...").rstrip()
     pattern, text = (_NUMBER.sub("#", line) for line in (start, found))
@@ -91,15 +91,15 @@ def _is_about(one: tuple[str, str, str], other: tuple[str, str, str]) -> bool:
     if not unit or not other_unit:
         return unit == other_unit
     sizes = [float(value) * _UNITS.get(each, 1.0) for value, each in ((number, unit), (other_number, other_unit))]
-    # Of what is next to nothing any share may come.
+    # Small durations and percentages vary by more.
     return max(sizes) <= _LIKE * min(sizes) or unit == "%" or max(sizes) < _UNITS["ms"]
 
 
 @dataclass
 class Reader:
-    """Somebody who does what pages say, in a folder.
+    """Follows pages, in a folder.
 
-    `inside` are the words before a command that has it run on a network of its own. With `may_replace`, files that are
+    `inside` are words that, put before a command, run it in a network of its own. With `may_replace`, files that are
     there are removed before a command that writes them: the blocks of a how-to page are alternatives.
     """
 
@@ -114,7 +114,7 @@ class Reader:
     _look_again: str | None = None
 
     def read(self, page: str, takes: Callable[[Block], bool] = lambda _: True, *, first: Sequence[str] = ()) -> None:
-        """Do what the page says, of its console blocks those that are taken; `first` is what runs before."""
+        """Follow a page. Of its console blocks, run those that `takes` accepts; run the commands `first` before all."""
         section = -1
         with ExitStack() as stack:
             stack.callback(self._close)
@@ -145,7 +145,7 @@ class Reader:
         (self.folder / self._file).write_text(block.text)
 
     def do(self, command: str, stack: ExitStack) -> None:
-        """Do what a line of a console says, to its end, or until it runs where it is to stay."""
+        """Run a command to its end; if it is one that stays, until it runs."""
         line, _, target = command.partition(" > ")
         program, *words = self._expanded(line)
         if program in _INSTALLS:
@@ -172,13 +172,13 @@ class Reader:
             self._look_again = command if "--once" in words else None
 
     def _expanded(self, line: str) -> list[str]:
-        """Return the words that a shell makes of a line, in the page's folder."""
+        """Return the words of a command line after the shell's expansion."""
         script = f"printf '%s\\0' {line}"
         shell = subprocess.run(["/bin/bash", "-c", script], cwd=self.folder, capture_output=True, text=True, check=True)
         return shell.stdout.split("\0")[:-1]
 
     def _start(self, argv: Sequence[str], command: str) -> None:
-        """Start what stays, and wait until it says that it runs."""
+        """Start a command that stays, and wait until it says that it runs."""
         process = Process(f"said-{len(self._open)}", argv, environment=self._environment, folder=self.folder)
         self._open.append(process)
         words = shlex.split(command)
@@ -187,7 +187,7 @@ class Reader:
         elif "tap" not in words:
             process.wait_for_log(" running: ")
         elif "--reason" in words:
-            # Of a healthy relay it prints nothing.
+            # It prints nothing while the relay is healthy.
             process.wait_until(lambda: _has_socket(process.pid), f"the connection of `{command}`")
         else:
             process.wait_until(lambda: process.stdout, f"lines of `{command}`")
@@ -195,13 +195,13 @@ class Reader:
     def _look(self, argv: Sequence[str], command: str, stack: ExitStack) -> None:
         """Look at a screen until it shows a group, and end it by Ctrl-C."""
         terminal = stack.enter_context(on_terminal(argv, folder=self.folder, environ=self._environment))
-        # A file that `init` proposed has groups of other names.
+        # The groups of a file that `init` proposed have other names.
         terminal.wait_for("/demo/" if "robot.yaml" in argv else "front")
         terminal.press("\x03")
         assert terminal.wait_for_end() in (0, 1, 130), f"{command}: {terminal.written[-2000:]}"
 
     def _compare(self, block: Block, stack: ExitStack) -> None:
-        """Wait until all lines that the page shows were said; those of a page without processes, word for word."""
+        """Wait until all lines of a block were printed; where no process runs, they must be equal word for word."""
         if "Ctrl-C ends the relay" in block.before:
             self._end(self._open[-1])
         lines = block.text.splitlines()
@@ -243,7 +243,7 @@ def _lines(process: Process) -> list[str]:
 
 
 def _spoken(text: str) -> list[str]:
-    """Return the lines, also without what the log or a remark has before its sentence."""
+    """Return the lines as they are, and without the prefix of a log entry or a remark."""
     lines = text.splitlines()
     return [*lines, *(re.sub(r"^(\[.*?\]: |syncrelay: )", "", line) for line in lines)]
 

@@ -1,4 +1,4 @@
-"""configs/grafana.json, and what its queries ask for."""
+"""configs/grafana.json and its queries."""
 
 import json
 import re
@@ -17,7 +17,7 @@ _MATCHER = re.compile(r"(\w+)(?:=|!=|=~|!~)\"[^\"]*\"")
 
 
 def series(expression: str) -> Iterator[tuple[str, set[str]]]:
-    """The name of each series that is asked for, with the labels that it is chosen by."""
+    """The name of each series in a query, with the labels that select it."""
     for name, matchers in MATCHERS.findall(expression):
         labels = [_MATCHER.fullmatch(each) for each in matchers.split(",")]
         yield name, {each[1] for each in labels if each is not None}

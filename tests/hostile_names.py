@@ -1,4 +1,4 @@
-"""Names as nobody should choose them, and what must hold of a text that was made with them."""
+"""Hostile names, and a check that a text made with them is safe to show."""
 
 import random
 
@@ -39,13 +39,13 @@ _SEQUENCES = (
 
 
 def hostile_name(chance: random.Random) -> str:
-    """A name with some of all that a terminal, a log, a page or a workflow may take for more than text."""
+    """A name with sequences that a terminal, a log, a page or a CI workflow may interpret."""
     parts = [*chance.sample(_SEQUENCES, 6), f"\n{FORGED}", f"\r\n{FORGED}", "name"]
     chance.shuffle(parts)
     return "".join(parts)
 
 
 def assert_shown_safely(text: str) -> None:
-    """Nothing but newlines is there beside what Unicode calls printable, and no name has begun a line."""
+    """Assert that a text has only printable characters and newlines, and that no name begins a line."""
     assert {each for each in text if not each.isprintable()} <= {"\n"}
     assert [line for line in text.split("\n") if line.startswith(FORGED)] == []

@@ -1,11 +1,11 @@
-"""`pytest -p tests.no_processes`: a test that starts a process or imports rclpy fails: `make test-fast` stays fast."""
+"""`pytest -p tests.no_processes` fails tests that start a process or import rclpy, to keep `make test-fast` fast."""
 
 import sys
 from collections.abc import Iterator
 
 import pytest
 
-# What CPython tells before it starts a process, by whichever way: https://docs.python.org/3/library/audit_events.html.
+# The audit events that CPython raises before it starts a process: https://docs.python.org/3/library/audit_events.html.
 _STARTS = ("os.fork", "os.forkpty", "os.posix_spawn", "os.system", "subprocess.Popen")
 
 

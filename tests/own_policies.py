@@ -1,4 +1,4 @@
-"""Packages with policies: the one of docs/howto/own_policy.md, built and installed, and ones that are broken."""
+"""Packages that bring policies: the example of docs/howto/own_policy.md, and broken ones."""
 
 import re
 import subprocess
@@ -29,7 +29,7 @@ def installed_example(folder: Path) -> Path:
 
 
 def offer(folder: Path, distribution: str, policies: Mapping[str, str], *, text: str = "") -> None:
-    """Write into a folder what an installed distribution is: a module of this text, and its entry points by name."""
+    """Write an installed distribution into a folder: a module with this text, and the entry points of its policies."""
     module = distribution.replace("-", "_")
     (folder / f"{module}.py").write_text(text)
     told = folder / f"{module}-1.0.dist-info"
@@ -41,7 +41,7 @@ def offer(folder: Path, distribution: str, policies: Mapping[str, str], *, text:
 
 @contextmanager
 def on_path(folder: Path) -> Iterator[None]:
-    """Have what is installed in a folder in this process too."""
+    """Make what is installed in a folder importable in this process."""
     before = set(sys.modules)
     with patch.object(sys, "path", [str(folder), *sys.path]):
         installed_policies.cache_clear()

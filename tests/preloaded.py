@@ -1,4 +1,4 @@
-"""Processes that begin with all that they import: a server has imported it once, and forks for each.
+"""Processes for tests, forked from a server that has imported what they need.
 
 Importing rclpy, numpy and types of messages is more than half of the CPU that a process of a short test needs. What
 is forked runs the same code, with an environment, a folder and standard streams of its own. What it lacks is the start
@@ -43,7 +43,7 @@ _PYTHON_PATH: Final = (Path(syncrelay.__file__).parents[1], Path(__file__).paren
 PYTHON: Final = {"PYTHONPATH": os.pathsep.join(map(str, _PYTHON_PATH)), "PYTHONSAFEPATH": "1"}
 """What the environment says of Python where nothing else is tested; with another, a process is no fork."""
 
-# The modules that are forked where they are to be run by `python -m`, and where each has its `main`.
+# The modules that are forked when they are started by `python -m`, and the module that has the `main` of each.
 _MAINS: Final = {
     "syncrelay": "syncrelay.cli",
     **{
@@ -57,7 +57,7 @@ _MAINS: Final = {
         )
     },
 }
-# What nodes import as they run. What is not installed here is missed by nobody until then.
+# What nodes import while they run. A module that is not installed here is skipped.
 _OF_NODES: Final = (
     "rclpy.executors",
     "syncrelay.cli.run",
@@ -85,15 +85,15 @@ _TYPE_SUPPORTS: Final = (
 _ALMOST_A_FILE: Final = "{version: 1, groups: {g: {policy: exact_time, topics: [{topic: /a, type: a/msg/A}]}}}"
 # Ray has threads of its own, and the other one runs a command.
 _NEVER_IMPORTED: Final = ("on_ray", "__main__")
-# What Python and the loader of libraries go by: it is too late to change it in a fork.
+# Python and the dynamic loader read these at their start, so a fork cannot change them.
 _GONE_BY_AT_THE_START: Final = ("AMENT_", "LANG", "LC_", "LD_", "PYTHON", "RMW_")
 _LONGEST_REQUEST: Final = 1 << 20
-# Threads of a test may all be the first to start a process.
+# Several threads of a test may start the first process at once.
 _STARTS: Final = threading.Lock()
 
 
 class Forked:
-    """A forked process, with what tests use of subprocess.Popen."""
+    """A forked process, with those methods of subprocess.Popen that tests use."""
 
     def __init__(self, connection: socket.socket, *, stdin: int | None) -> None:
         self.pid = int(connection.recv(64))
@@ -130,7 +130,7 @@ class Forked:
 
 
 class Imported(StrEnum):
-    """What a server has imported. A fork copies of that memory what it changes, and as it ends, that is most of it."""
+    """What a server has imported. At its end a fork changes, and so copies, most of that memory."""
 
     NODES = "nodes"
     COMMANDS = "commands"
@@ -147,7 +147,7 @@ def start(
     cwd: Path,
     imported: Imported = Imported.NODES,
 ) -> "subprocess.Popen[bytes] | Forked":
-    """Start a process: forked, where it could be with this environment."""
+    """Start a process; fork it if its command and environment allow that."""
     if not _is_forked(argv, env):
         return subprocess.Popen(argv, stdin=stdin, stdout=stdout, stderr=stderr, env=env, cwd=cwd)
     read, written = os.pipe() if stdin == subprocess.PIPE else (os.open(os.devnull, os.O_RDONLY), None)
@@ -176,7 +176,7 @@ def _is_forked(argv: Sequence[str], environ: Mapping[str, str]) -> bool:
 def run(
     argv: Sequence[str], *, environ: Mapping[str, str], folder: Path, stdin: str = "", timeout_s: float = 120
 ) -> "subprocess.CompletedProcess[str]":
-    """As subprocess.run with its output captured, but forked where it could be."""
+    """Run a process to its end and capture its output, as subprocess.run does; fork it if possible."""
     if not _is_forked(argv, environ):
         return subprocess.run(
             argv, cwd=folder, env=environ, input=stdin, capture_output=True, text=True, timeout=timeout_s, check=False
@@ -214,17 +214,17 @@ def _server(imported: Imported) -> str:
             [sys.executable, "-m", __spec__.name, imported, str(listening.fileno())],
             stdin=subprocess.PIPE,
             pass_fds=[listening.fileno()],
-            # numpy's library would start a thread for each core, and with threads no fork is safe.
+            # Otherwise numpy starts a thread for each core, and forking a process with threads is unsafe.
             env={**os.environ, **PYTHON, "OPENBLAS_NUM_THREADS": "1"},
         )
-    # Its end is that of its stdin.
+    # The server ends when its stdin is closed.
     atexit.register(server.communicate)
     return address
 
 
 def main() -> None:
     """Serve; in a fork, run what was asked for."""
-    # A Ctrl-C is for whoever started the server, who ends the forks.
+    # Ctrl-C is handled by the process that started the server, which ends the forks.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     imported, listening_at = sys.argv[1:]
     for name in (*_MAINS.values(), *_OF_NODES, *(_of_commands() if imported == Imported.COMMANDS else ())):
@@ -233,10 +233,10 @@ def main() -> None:
     for name in _TYPE_SUPPORTS:
         with contextlib.suppress(ImportError):
             _load_type_supports(name)
-    # The first file has pydantic build its models.
+    # pydantic builds its models for the first file.
     with contextlib.suppress(ConfigError):
         load_text(_ALMOST_A_FILE, environ={})
-    # What is there stays: the collector would go through it in each fork, which copies the memory.
+    # Otherwise the collector visits these objects in each fork, which copies their memory.
     gc.collect()
     gc.freeze()
     # LTTng's two threads are the only ones.
@@ -245,7 +245,7 @@ def main() -> None:
         request, streams = _served(listening)
     if request is not None:
         code = _run(request, streams)
-        # Where DDS is left, all that Python does at its end is to touch, so copy, most memory.
+        # Without DDS, the rest of Python's exit only touches, and so copies, most of the memory.
         if held_by(os.getpid()):
             sys.exit(code)
         for stream in (sys.stdout, sys.stderr):
@@ -270,7 +270,10 @@ def _load_type_supports(name: str) -> None:
 
 
 def _served(listening: socket.socket) -> tuple[dict[str, Any] | None, Sequence[int]]:
-    """Fork for each request, and tell how each fork ended; return in a fork with the request, at the end without."""
+    """Fork for each request and report how each fork ended.
+
+    Returns the request and its streams in a fork, None in the server once its stdin has ended.
+    """
     forks: dict[int, tuple[int, socket.socket]] = {}
     tracing = _Tracing()
     with selectors.DefaultSelector() as selector:
@@ -309,7 +312,7 @@ def _tell_end(pid: int, connection: socket.socket) -> None:
 
 
 def _run(request: Mapping[str, Any], streams: Sequence[int]) -> int | None:
-    """Take on what a process is started with, and run the module that it is to run."""
+    """Run the requested module with the environment, folder and streams of the request."""
     for number, fd in enumerate(streams):
         os.dup2(fd, number)
         os.close(fd)
@@ -332,9 +335,9 @@ def _run(request: Mapping[str, Any], streams: Sequence[int]) -> int | None:
 
 
 class _Tracing:
-    """LTTng's library, which comes with rclpy: as it ends it waits for two threads, which a fork has to make anew.
+    """Forks with LTTng, which comes with rclpy: at its end it waits for two threads that only its hooks restart.
 
-    These are the functions that LTTng's own wrapper of fork() calls, with a place for a mask of signals.
+    LTTng's wrapper of fork() calls the same hooks. Each takes room for a signal mask.
     """
 
     def __init__(self) -> None:

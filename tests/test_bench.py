@@ -1,4 +1,4 @@
-"""What `make bench` says of its rounds; what it measures is run by itself."""
+"""The statistics of `make bench`. Its measurements are not tested here."""
 
 import math
 import random
@@ -11,7 +11,7 @@ from bench.intervals import median_interval, stolen_share, undisturbed
 from bench.spent import Thread, by_purpose
 
 
-# The ranks are those of any table of confidence intervals for a median.
+# The ranks are from tables of confidence intervals for a median.
 @pytest.mark.parametrize(("n", "low", "high"), [(6, 1, 6), (9, 2, 8), (10, 2, 9), (25, 8, 18), (60, 22, 39)])
 def test_the_interval_of_a_median_is_between_two_of_its_values(n, low, high):
     values = list(range(1, n + 1))

@@ -1,4 +1,4 @@
-"""`make` and CI work on a machine that has told them nothing, and take versions that are known."""
+"""`make` and CI need no settings of the machine, and install pinned versions."""
 
 import itertools
 import subprocess

@@ -1,4 +1,4 @@
-"""The garbage collector rests while modules are imported, and only then."""
+"""The garbage collector is off while modules are imported, and only then."""
 
 import gc
 

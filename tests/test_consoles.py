@@ -51,7 +51,7 @@ cases:
       points    |.A.....
       -> b: aA
 """
-# What the pages take for granted, on the demo's rig.
+# The files that the pages assume, for the demo's rig.
 _FILES: Final = {
     "fusion.yaml": _HEAD + _FRONT + _REAR,
     "new.yaml": (_HEAD + _FRONT + _REAR).replace("20ms", "30ms"),
@@ -83,13 +83,13 @@ def _yaml_of(page: str, number: int) -> str:
 
 
 _LAYOUT: Final = STORE.types["std_msgs/msg/MultiArrayLayout"]([], 0)
-# Pages that go through a recording of 30 s several times.
+# Pages that read a recording of 30 s several times.
 _SLOW: Final = ("choose_policy_slop_queue.md", "recordings.md")
 # Pages with one block that is not run.
 _MARKED: Final = ("first_hour.md", "fleet.md", "observe.md", "reload.md", "testing.md")
 # Pages whose reader has a relay running.
 _RELAY_RUNS: Final = ("lossy_networks.md", "observe.md", "reload.md")
-# What a page has beside these, or in their place.
+# Further files of a page, or other ones in their place.
 _OF_PAGE: Final = {
     "before_a_message_flows.md": {"fusion.yaml": _HEAD + _FRONT},
     "files.md": {"fusion.yaml": _README_FILE, "new.yaml": _README_FILE.replace("20ms", "30ms")},
@@ -97,7 +97,7 @@ _OF_PAGE: Final = {
     "observe.md": {"fusion.yaml": _HEAD + _FRONT + _REAR.replace("/demo/imu", "/imu")},
     "testing.md": {
         "fusion.yaml": _README_FILE,
-        # Of its cases those on messages that are not recorded.
+        # Its cases that need no recording.
         "tests/fusion.yaml": _yaml_of("testing.md", 1)
         .partition("  a lidar that dies")[0]
         .replace("drop: 1%", "drop: 10%"),
@@ -107,7 +107,7 @@ _OF_PAGE: Final = {
 
 @pytest.fixture(scope="module")
 def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with what the how-to pages take for granted."""
+    """A folder with the files and recordings that the how-to pages assume."""
     folder = tmp_path_factory.mktemp("world")
     for name, text in _FILES.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -178,7 +178,7 @@ def test_what_is_not_run_says_why_and_is_counted(figures):
     skipped = [line for block in consoles if block.reason for line in commands_of(block)]
     figures(f"console blocks of tutorials and how-to pages: {len(commands)} commands, {len(skipped)} of them not run")
     assert len(skipped) == 2
-    # Texts that no block before them prints are marked, too.
+    # Texts that are no output of a block are marked too.
     assert Counter(name for name, block in blocks if block.reason) == dict.fromkeys(_MARKED, 1)
 
 
@@ -201,9 +201,9 @@ def test_a_line_is_like_another_but_for_measured_figures(shown, found, alike):
 
 @contextmanager
 def _own_network() -> Iterator[list[str]]:
-    """Give the words before a command that has it run on a network of its own, with a host called robot.
+    """Yield words that, put before a command, run it in a network namespace of its own, with a host called robot.
 
-    Ports are then those that the pages name, whatever runs beside, and `top` finds no relay of another test.
+    So the ports that pages name are free, and `top` finds no relay of another test.
     """
     with TemporaryDirectory() as folder:
         hosts = Path(folder) / "hosts"

@@ -1,4 +1,4 @@
-"""The examples run, and so does what the page of the library shows."""
+"""The examples and the programs on the page of the library run."""
 
 import re
 import runpy

@@ -1,4 +1,4 @@
-"""What a dead process left of Fast DDS's files is removed, and nothing that a living one has."""
+"""Files of Fast DDS that a dead process left are removed; those of living processes stay."""
 
 import fcntl
 import mmap
@@ -62,7 +62,7 @@ def test_a_lock_keeps_its_file_though_no_process_is_seen_to_have_it(folder):
     with ours, theirs:
         with (folder / f"{SEGMENT}_el").open("rb") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            # Open on its way only: as for a process of another container, no /proc/PID/fd shows it.
+            # The descriptor is in flight, so no /proc/PID/fd shows it, as with a process of another container.
             socket.send_fds(ours, [b"."], [lock.fileno()])
         remove_unused({PORT, SEGMENT}, folder)
     assert names_in(folder) == {*_FILES[4:], "fastrtps_port7415", "sem.another"}

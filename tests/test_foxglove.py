@@ -25,18 +25,18 @@ def _paths(panel: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def plotted() -> list[str]:
-    """The topics of numbers."""
+    """The topics of the plots."""
     return [topic for name, panel in _PANELS.items() if name.startswith("Plot!") for topic, _ in _paths(panel)]
 
 
 def detailed() -> tuple[str, str]:
-    """Hardware id and name of the status whose values are shown."""
+    """The hardware id and name of the DiagnosticStatus whose values are shown."""
     (panel,) = (panel for panel in _PANELS.values() if "selectedName" in panel)
     return panel["selectedHardwareId"], panel["selectedName"]
 
 
 def _leaves(node: Any) -> Iterator[str]:
-    """The panels of a layout's tree, each node of which is split in two."""
+    """The panels of a layout, which is a binary tree."""
     if isinstance(node, str):
         yield node
         return

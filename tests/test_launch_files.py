@@ -1,4 +1,4 @@
-"""The launch files, as far as they can be checked without launch; where it is installed, it reads them too."""
+"""The launch files, checked without launch; where launch is installed, it reads them too."""
 
 import ast
 import re
@@ -17,7 +17,7 @@ _TREES = {path.name: ast.parse(path.read_text(), path.name) for path in _FILES}
 
 
 def _first_arguments(name: str, *functions: str) -> set[str]:
-    """The texts that a launch file passes first to these functions."""
+    """The strings that a launch file passes as the first argument to these functions."""
     calls = [node for node in ast.walk(_TREES[name]) if isinstance(node, ast.Call) and node.args]
     named = [node.args[0] for node in calls if isinstance(node.func, ast.Name) and node.func.id in functions]
     return {node.value for node in named if isinstance(node, ast.Constant) and isinstance(node.value, str)}
@@ -57,7 +57,7 @@ def test_the_relay_is_started_with_options_that_it_has():
 
 
 def _groups():
-    """The function of groups.launch.py that reads the file, which needs no launch."""
+    """Return the function of groups.launch.py that reads the file; it does not need launch."""
     kept = [node for node in _TREES["groups.launch.py"].body if getattr(node, "name", None) == "_groups"]
     names = {"Path": Path, "re": re, "yaml": yaml}
     exec(compile(ast.Module(kept, []), "groups.launch.py", "exec"), names)  # noqa: S102  it is ours

@@ -1,4 +1,4 @@
-"""A policy that a package brings is known everywhere, and a package that is broken harms nobody but who asks for it."""
+"""A policy of another package works in all commands; a broken package affects only files that use it."""
 
 import json
 import random
@@ -97,7 +97,7 @@ def test_editors_and_shells_complete_it(package: Path, tmp_path: Path):
 
 
 def _apart(by_ms: float, *, seed: int) -> list[Frame]:
-    """Two inputs of 10 Hz, of which the second is stamped so much later, 1 ms more or less."""
+    """Two inputs at 10 Hz; the second is stamped `by_ms` later, give or take 1 ms."""
     chance = random.Random(seed)
     first = [100.0 * n for n in range(1, 61)]
     return merged(at("/left", *first), at("/right", *(each + by_ms + chance.uniform(-1, 1) for each in first)))
@@ -116,7 +116,7 @@ def test_a_recording_is_judged_by_it_and_its_own_key_is_suggested(package: Path,
     with on_path(package):
         for n in range(draws):
             by, is_too_wide = chance.choice([-1, 1]) * chance.uniform(5, 45), n % 3 < 2
-            # The one that is stamped earlier, and the later one, in turns.
+            # The input that is stamped earlier and the one that is stamped later lead in turns.
             lead = _TOPICS[(by < 0) ^ (n % 2)]
             reach = chance.uniform(1, abs(by) - 3) if is_too_wide else chance.uniform(abs(by) + 3, 60)
             drawn = (
@@ -262,7 +262,7 @@ def test_two_policies_with_one_class_name_are_both_in_the_schema(tmp_path: Path)
             assert validator.is_valid({"version": 1, "groups": {"fused": group}}) == key.startswith(name)
 
 
-# Types of keys as a module has them, each with a value as it is written and as it is read.
+# Types of keys, each with a value as it is written in a file and as it is read.
 _KINDS = (
     ("Duration", "20ms", 20 * MS),
     ("Annotated[int, Field(ge=1)]", 5, 5),
@@ -271,7 +271,7 @@ _KINDS = (
     ("str", "a", "a"),
     ("bool", False, False),
 )
-# What every group has already, by its type above.
+# Keys that every group has, with the index of their type above.
 _THERE = {"lazy": 5, "manifest": 5}
 
 

@@ -1,4 +1,4 @@
-"""package.xml says what pyproject.toml says, in the words of ROS."""
+"""package.xml agrees with pyproject.toml."""
 
 import ast
 import re
@@ -10,7 +10,7 @@ _ROOT = Path(__file__).parents[1]
 _PACKAGE = ET.parse(_ROOT / "package.xml").getroot()  # noqa: S314  a file of ours
 _PROJECT = tomllib.loads((_ROOT / "pyproject.toml").read_text())["project"]
 _NEEDED = {each.text or "" for each in _PACKAGE.findall("exec_depend")}
-# Where Debian and rosdep have another name for it than PyPI.
+# Dependencies that rosdep does not name python3-NAME.
 _KEYS = {"pyyaml": "python3-yaml"}
 _OF_ROS = re.compile(r"rclpy|ament_index_python|launch(_ros)?|\w+_(msgs|srvs|interfaces)")
 

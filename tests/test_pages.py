@@ -1,4 +1,4 @@
-"""What the README and the pages of docs/ show is true: files are in order, commands exist, the error is what comes."""
+"""What the README and the pages of docs/ show is true: files are valid, commands exist, errors are as shown."""
 
 import json
 import re
@@ -19,14 +19,14 @@ from tests.test_launch_files import declared
 
 _ROOT = Path(__file__).parents[1]
 _DOCS = _ROOT / "docs"
-# Of docs/, what `make docs` takes there from elsewhere is no page.
+# `make docs` copies files of the repository there.
 _OF_DOCS = [page for page in sorted(_DOCS.rglob("*.md")) if not page.is_relative_to(_DOCS / "repository")]
 _PAGES = {path: path.read_text() for path in [_ROOT / "README.md", *_OF_DOCS]}
 _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 _BLOCKS = [block for page in _PAGES.values() for block in _BLOCK.findall(page)]
 _YAML = [text for kind, text in _BLOCKS if kind == "yaml"]
 _FILES = [text for text in _YAML if text.startswith("version:") and "\ncases:" not in text]
-# That of the tutorial is run by test_consoles.py.
+# test_consoles.py runs the one of the tutorial.
 _SUITES = [text for text in _YAML if "\ncases:" in text and "config: ../" in text]
 _SHOWN = [line.removeprefix("$ ") for kind, text in _BLOCKS if kind == "console" for line in text.splitlines()]
 _INLINE = [each for page in _PAGES.values() for each in re.findall(r"`((?:syncrelay|make|pip install) [^`]+)`", page)]
@@ -63,7 +63,7 @@ def test_the_workflow_runs_commands_that_exist():
 @pytest.mark.parametrize("command", _LAUNCHED)
 def test_every_launch_that_a_page_shows_has_its_arguments(command):
     file, *arguments = command.split()
-    # A group's relay gets all but its group and name from whoever starts the groups.
+    # groups.launch.py sets the group and the name of each relay; all other arguments pass through.
     takes = declared("relay.launch.py") - ({"group", "node_name"} if file == "groups.launch.py" else set())
     assert (_ROOT / "launch" / file).is_file()
     assert {argument.split(":=")[0] for argument in arguments} <= takes
@@ -102,7 +102,7 @@ def _is_known_install(words):
 
 
 def _is_syncrelay_command(words):
-    # The help of the command, or of the relay, which names every option that it takes.
+    # The help of a command, or of the relay, names all of its options.
     command = [] if words[0].startswith("-") else [words[0]]
     run = subprocess.run(
         [sys.executable, "-m", "syncrelay", *command, "--help"], capture_output=True, text=True, check=False
@@ -165,7 +165,7 @@ def _leads_somewhere(page, target):
 
 
 def _anchors(text):
-    """Those that GitHub gives to headings."""
+    """The anchors that GitHub gives to headings."""
     headings = re.findall(r"^#+ (.+)$", _prose(text), re.MULTILINE)
     return [re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings]
 

@@ -1,4 +1,4 @@
-"""What comes from outside is shown as text: in one line, in lines of ours, in the log, whatever it holds."""
+"""Text from outside is shown safely, in one line, in several, and in the log."""
 
 import json
 import logging
@@ -53,7 +53,7 @@ def test_what_would_move_hide_or_turn_is_escaped_and_all_else_stays(text, shown)
 
 @pytest.fixture
 def log():
-    """The relay's log; as it was before, afterwards."""
+    """The relay's log, which is restored afterwards."""
     before = LOGGER.handlers, LOGGER.level, LOGGER.propagate
     yield LOGGER
     LOGGER.handlers, LOGGER.level, LOGGER.propagate = before

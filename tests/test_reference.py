@@ -1,4 +1,4 @@
-"""The pages of docs/reference that are made of what the program knows say what it knows now."""
+"""The generated pages of docs/reference are up to date."""
 
 import re
 from itertools import pairwise

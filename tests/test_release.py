@@ -1,4 +1,4 @@
-"""A release is one version everywhere, and is refused before anything is built where something is amiss."""
+"""A release sets one version everywhere; a faulty one is refused before anything is built."""
 
 import os
 import re
@@ -16,7 +16,7 @@ _VERSION = _PYPROJECT["project"]["version"]
 _PLACES = _PYPROJECT["tool"]["bumpversion"]["files"]
 _SECTION = "## [9.8.7] - 2026-12-31"
 _PROGRAM = shutil.which("git") or "git"
-# No settings of whoever runs the tests, such as signed commits.
+# The user's own settings, such as signed commits, are not used.
 _GIT = {
     **{name: value for name, value in os.environ.items() if not name.startswith("GIT_")},
     "GIT_CONFIG_GLOBAL": os.devnull,
@@ -59,7 +59,7 @@ def test_the_changelog_has_an_unreleased_section_and_then_the_versions_newest_fi
 
 @pytest.fixture
 def small_clone(tmp_path: Path) -> Path:
-    """A repository with what a release looks at before it builds."""
+    """A repository with the files that .ci/release checks before it builds."""
     clone = tmp_path / "clone"
     (clone / ".ci").mkdir(parents=True)
     shutil.copy(_ROOT / ".ci" / "release", clone / ".ci")
@@ -128,5 +128,5 @@ def _state(clone: Path) -> str:
 
 
 def _shown_release(clone: Path, **environment: str) -> None:
-    """Make a release whose output is that of the tests: `make test-release` shows it."""
+    """Make a release; its output is not captured, so that `make test-release` shows it."""
     subprocess.run([clone / ".ci" / "release", sys.executable, "9.8.7"], env=_GIT | environment, check=True)

@@ -1,4 +1,4 @@
-"""Tests of the image, run by `make test-container` beside an engine of their own; without one, none is collected."""
+"""Tests of the image. `make test-container` runs them with a Docker engine of its own; without it none is collected."""
 
 import os
 import secrets
@@ -34,7 +34,7 @@ def relays(tmp_path: Path, ros_domain: int) -> Iterator[Relays]:
 
 @pytest.fixture
 def host(tmp_path: Path, ros_domain: int) -> Iterator[Stage]:
-    """Starts players and collectors on the host, as any user's nodes would be."""
+    """Starts players and collectors on the host, as a user's nodes are."""
     with host_stage(tmp_path, ros_domain) as stage:
         yield stage
 
@@ -51,11 +51,11 @@ def containers(tmp_path: Path, ros_domain: int) -> Iterator[ContainerStage]:
 
 @pytest.fixture
 def bridge() -> Iterator[Network]:
-    """A bridge network of the engine. A test asks for it first, so that it outlives the containers that use it."""
+    """A bridge network. Tests request it first, so that it is removed after the containers that use it."""
     name = f"syncrelay-{secrets.token_hex(4)}"
     docker("network", "create", name)
     try:
         yield Network(name)
     finally:
-        # What `docker run --rm` started is removed in its own time.
+        # Containers of `docker run --rm` are removed some time after their end.
         wait_until(lambda: run_docker("network", "rm", name).returncode == 0, "the end of all that used the bridge")

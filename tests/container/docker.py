@@ -15,7 +15,7 @@ ON_ROS = "syncrelay-ros"
 Network = NewType("Network", str)
 HOST = Network("host")
 
-# The least that a robot's operator would want: what compose.yaml asks for, on a command line.
+# The options of compose.yaml as those of `docker run`.
 HARDENED = (
     "--read-only",
     "--tmpfs=/tmp:size=16m,mode=1777",
@@ -28,7 +28,7 @@ PROBED_EVERY_SECOND = ("--health-interval=1s", "--health-retries=1", "--health-s
 
 
 def run_docker(*arguments: str, environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
-    """Run a docker command, whatever it comes to."""
+    """Run a docker command, which may fail."""
     return subprocess.run(
         ["docker", *arguments],  # noqa: S607  the engine's own, first in PATH
         env={**os.environ, **(environment or {})},
@@ -39,14 +39,14 @@ def run_docker(*arguments: str, environment: dict[str, str] | None = None) -> su
 
 
 def docker(*arguments: str, environment: dict[str, str] | None = None) -> str:
-    """Run a docker command that must succeed; what it prints on stdout."""
+    """Run a docker command that must succeed, and return what it prints."""
     run = run_docker(*arguments, environment=environment)
     assert run.returncode == 0, f"docker {' '.join(arguments)}: {run.stderr}"
     return run.stdout.strip()
 
 
 class Container:
-    """A container by its id."""
+    """A container."""
 
     def __init__(self, identity: str) -> None:
         self.id = identity
@@ -65,7 +65,7 @@ class Container:
         return str(self.inspect()["State"]["Health"]["Status"])
 
     def exit_code(self) -> int:
-        """The exit code, as soon as it has ended."""
+        """Wait for its end, and return its exit code."""
         wait_until(lambda: not self.running(), "the container's end")
         return int(self.inspect()["State"]["ExitCode"])
 
@@ -76,7 +76,7 @@ class Container:
         return next((int(pid) for pid, words in found if _is_relay(words)), None)
 
     def shares_memory_with(self, pid: int) -> bool:
-        """Whether the relay has mapped what a process of Fast DDS has, and so gets its data without a network."""
+        """Whether the relay maps shared memory of a process, which Fast DDS then uses in place of the network."""
         own = self.relay_pid()
         assert own is not None
         return not _shared_memory_of(own).isdisjoint(_shared_memory_of(pid))
@@ -97,7 +97,7 @@ def _shared_memory_of(pid: int) -> set[str]:
 
 
 def _is_relay(command_line: str) -> bool:
-    # Below an init, the init's own command line names the relay too.
+    # The command line of an init names the relay too.
     return "/bin/syncrelay" in command_line and "docker-init" not in command_line
 
 

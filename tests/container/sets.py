@@ -1,4 +1,4 @@
-"""A small recording that must come out of a relay as the engine matches it, wherever the relay is."""
+"""A small recording of which a relay, wherever it runs, must publish the sets that the engine finds."""
 
 from syncrelay.sync import ExactTime
 from tests.ros import relaying
@@ -14,10 +14,9 @@ CONFIG = config({"front": FRONT})
 
 
 def assert_relayed(stage: Stage, topics: dict[str, str] | None = None, group: str = "front") -> Player:
-    """Play on this stage, and collect there what a relay that runs elsewhere makes of it: 20 sets, no more.
+    """Play on this stage and assert that a relay elsewhere publishes exactly the 20 expected sets.
 
-    The player is still running then.
-    Every type of the topics must have the fields of VECTOR.
+    Every type of the topics must have the fields of VECTOR. Returns the player, which still runs.
     """
     topics = topics or PAIR
     first, second = topics

@@ -14,14 +14,14 @@ _TESTS = Path(__file__).parents[1]
 
 @contextmanager
 def host_stage(folder: Path, domain: int) -> Iterator[Stage]:
-    """A stage that sees beyond its own host, as DDS takes containers to be beyond it. The network is ours alone."""
+    """A stage that discovers nodes beyond its host, since to DDS containers are. No other machine is on its network."""
     with running_stage(folder, domain) as stage:
         del stage.environment["ROS_AUTOMATIC_DISCOVERY_RANGE"]
         yield stage
 
 
 class ContainerStage(Stage):
-    """A stage whose processes are containers, of the image, the user and the network that are set when they start."""
+    """A stage whose processes are containers with the image, user and network that are set when they start."""
 
     def __init__(self, folder: Path, domain: int) -> None:
         super().__init__(folder, domain)
@@ -30,7 +30,7 @@ class ContainerStage(Stage):
         self.network: Network = HOST
 
     def start(self, name: str, argv: Sequence[str], *, stdin: int = subprocess.DEVNULL) -> Process:
-        # Files that the test has made are the player's and the collector's to use, whoever they run as.
+        # Players and collectors of any user may read and write the test's files.
         self.folder.chmod(0o755)
         for file in self.folder.iterdir():
             if file.suffix == ".frames":

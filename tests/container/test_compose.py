@@ -1,4 +1,4 @@
-"""compose.yaml as it is: each of its profiles brought up until the engine calls it healthy."""
+"""Each profile of compose.yaml comes up and is healthy."""
 
 import os
 import signal
@@ -27,7 +27,7 @@ class Project:
         self._folder = folder
 
     def up(self, text: str, *services: str) -> dict[str, Container]:
-        """Bring services up, the default ones if none is named; their containers, all healthy."""
+        """Bring services up, by default the default ones, and return their containers, which are healthy."""
         self._folder.chmod(0o755)
         (self._folder / "fusion.yaml").write_text(text)
         self.compose("up", "--detach", "--no-build", "--wait", *services)

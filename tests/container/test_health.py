@@ -1,4 +1,4 @@
-"""What the engine is told of a relay's health, and what it makes of a crash."""
+"""The health that the engine reports for a relay, and its restart after a crash."""
 
 import os
 import signal
@@ -24,7 +24,7 @@ def test_a_relay_whose_loop_is_stopped_is_unhealthy_until_it_goes_on(relays):
 
 
 def test_a_relay_that_cannot_write_its_heartbeat_is_not_called_healthy(relays):
-    # Its start is given hardly any time, as failed probes do not count in it; 0 would be the image's 20 s.
+    # Failed probes do not count during the start period; 0 would mean the image's 20 s.
     relay = relays.run(
         CONFIG,
         "--network=host",

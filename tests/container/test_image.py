@@ -1,4 +1,4 @@
-"""The image by itself: what is in it, what is left out, and what it does without a relay."""
+"""The image: what is in it, what is left out, and its commands other than the relay."""
 
 import hashlib
 import json
@@ -54,7 +54,7 @@ groups:
 
 @pytest.fixture
 def in_image(tmp_path: Path):
-    """Runs a command of the image on files of the test, without a network."""
+    """Runs a command of the image on the test's files, without a network."""
     tmp_path.chmod(0o755)
 
     def run(*words: str, options: tuple[str, ...] = ()):
@@ -102,7 +102,7 @@ def test_a_relay_without_its_file_says_so(in_image):
 
 
 def test_the_demo_runs_in_the_container(in_image):
-    # On a busy machine its processes need some seconds to find each other.
+    # On a busy machine its processes take some seconds to discover each other.
     run = in_image("demo", "--seconds", "15")
     assert run.returncode == 0, run.stderr
 

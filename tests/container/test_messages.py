@@ -1,4 +1,4 @@
-"""An image with message packages of the user's own, as docker/messages/README.md says: built, found, relayed."""
+"""An image with message packages of the user's own, built as docker/messages/README.md says."""
 
 from pathlib import Path
 
@@ -73,7 +73,7 @@ def test_the_compiler_stays_out_of_the_image():
 
 
 def test_what_is_generated_has_the_type_hashes_that_ros_gave_the_same_files(tmp_path):
-    # Peers of another type hash are other types to them.
+    # Peers with another type hash do not connect.
     tmp_path.chmod(0o777)
     said = docker(
         *("run", "--rm", "--network=none", "--user=0", "--entrypoint=python3", "--env=PYTHONPATH=/docker"),

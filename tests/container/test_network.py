@@ -1,4 +1,4 @@
-"""Data through a relay in a container, over the networks and users that a robot has."""
+"""Data through a relay in a container, with the networks and users that robots have."""
 
 import pytest
 
@@ -41,8 +41,8 @@ def test_a_relay_shares_no_memory_by_default(relays, host):
     assert not relay.shares_memory_with(assert_relayed(host).process.pid)
 
 
-# The last one: Fast DDS takes processes for neighbours, who may share memory, by the interfaces that are up when each
-# of them starts, and a bridge that is left goes down in its own time.
+# This test is last: Fast DDS shares memory between processes that saw the same interfaces at their start, and a bridge
+# goes down some time after its removal.
 def test_containers_of_different_users_reach_each_other_on_a_bridge(bridge, relays, containers):
     relays.run(CONFIG, f"--network={bridge}", "--user=4711", *HARDENED)
     containers.user, containers.network = 4712, bridge

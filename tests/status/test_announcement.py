@@ -1,4 +1,4 @@
-"""Relays of this machine, found by the names that they announce, whatever else announces some."""
+"""Relays of this machine are found by the names that they announce, whatever else is announced."""
 
 import os
 import random
@@ -15,7 +15,7 @@ from syncrelay.top.client import base_urls, search
 from tests.status.support.serving import Relay
 from tests.top import states
 
-# Of this process alone: the names of all relays of a machine share one space.
+# An address of this process's own, as all relays of a machine share one name space.
 HOST = f"127.77.{os.getpid() >> 8 & 255}.{os.getpid() & 255}"
 ROW = "0000000000000000: 00000002 00000000 00010000 0001 01 12345 @syncrelay-status/{}\n"
 
@@ -38,9 +38,9 @@ def test_a_relay_is_found_at_whatever_address_and_port_until_it_ends(listen, rea
     place = Place(relay.address[1], relay.address[0])
     url = f"http://{reached_at}:{place.port}"
     try:
-        # Others of this machine may be there too.
+        # Other relays of this machine may be found too.
         assert base_urls(None).count(url) == 1
-        # For a machine that others use too.
+        # Enough on a busy machine.
         assert [answer.url for answer in search([url], timeout_s=60, whole_s=60).relays] == [url]
     finally:
         relay.stop()

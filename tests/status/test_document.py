@@ -1,4 +1,4 @@
-"""The state as JSON: all of it, in numbers that JSON has, under the names that `top` and others read."""
+"""The document of /status: every field, as JSON, and read back."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""configs/grafana.json: a dashboard as Grafana imports it, that asks for nothing but what /metrics has."""
+"""configs/grafana.json: Grafana can import it, and it queries only what /metrics has."""
 
 import json
 import re
@@ -15,7 +15,7 @@ from tests.status.support.states import relay, working
 _PANELS = DASHBOARD["panels"]
 _VARIABLES = {each["name"]: each for each in DASHBOARD["templating"]["list"]}
 _DATASOURCE = {"type": "prometheus", "uid": "${datasource}"}
-# What Prometheus itself gives each series, and what Grafana puts into a query.
+# Labels that Prometheus adds to each series, and variables that Grafana defines.
 _OF_A_SCRAPE = {"job", "instance"}
 _BUILT_IN = {"__rate_interval", "__interval"}
 _FUNCTIONS = {"changes", "count", "histogram_quantile", "max", "rate", "sum", "time", "vector"}
@@ -23,7 +23,7 @@ _GROUPING = re.compile(r"\b(?:by|without|on|ignoring) ?\(([^)]*)\)")
 
 
 def _exported():
-    """The labels of each series of a scrape, by its name."""
+    """The labels of each series of a scrape, by the name of the series."""
     text = generate_latest(registry(lambda: relay(working()))).decode()
     samples = [sample for family in text_string_to_metric_families(text) for sample in family.samples]
     return {each.name: set(each.labels) | _OF_A_SCRAPE for each in samples}
@@ -33,7 +33,7 @@ _EXPORTED = _exported()
 
 
 def _left(expression):
-    """The labels that a result has."""
+    """The labels of the result of a query."""
     grouped = [set(re.split(r", ?", labels)) for labels in _GROUPING.findall(expression)]
     return grouped[0] if grouped else set.intersection(*(_EXPORTED[name] for name, _ in series(expression)))
 

@@ -15,7 +15,7 @@ HEALTHY = relay(working())
 OPEN = Listen("0.0.0.0", range(1))  # noqa: S104  what a file may say
 ALIAS = "robot_1.fleet.example"
 NAMED = Listen("127.0.0.1", range(1), hosts=(ALIAS, "10.0.0.5", "fd00::5"))
-# Of the machine that runs the test, as its own tools say it.
+# The name of the machine that runs the test.
 THIS_MACHINE = socket.gethostname().lower()
 
 LOOPBACK = ["localhost", "127.0.0.1", "127.0.0.53", "127.255.255.254", "[::1]", "[0:0:0:0:0:0:0:1]", "[::ffff:7f00:1]"]
@@ -54,7 +54,7 @@ STRANGE = [
 
 
 def told(answer: bytes) -> bool:
-    """Whether an answer holds the state; if not, it says why and nothing of the robot."""
+    """Whether an answer holds the state; a refusal must hold nothing of it."""
     is_told = answer.startswith((b"HTTP/1.1 200 ", b"HTTP/1.0 200 "))
     assert is_told == (b"/camera" in answer)
     return is_told
@@ -93,7 +93,7 @@ def test_a_request_that_names_no_host_is_answered_where_http_had_none_yet(addres
 
 _ANSWERED = {
     ANY: dict.fromkeys(LOOPBACK, 200),
-    # What the file lists, and what is like it.
+    # Names that the file lists, and similar ones.
     NAMED: {
         **dict.fromkeys([ALIAS, ALIAS.upper(), f"{ALIAS}.:80", "10.0.0.5", "[fd00::5]:9464", "localhost"], 200),
         **dict.fromkeys(["fleet.example", f"a.{ALIAS}", "10.0.0.6", "robot-1.fleet.example"], 403),
@@ -104,7 +104,7 @@ _ANSWERED = {
         **dict.fromkeys([THIS_MACHINE, THIS_MACHINE.upper(), f"{THIS_MACHINE.partition('.')[0]}.local"], 200),
         **dict.fromkeys(["syncrelay.robots.svc", f"{THIS_MACHINE}.evil.example", "10.0.0.5.evil.example"], 403),
     },
-    # The name that `listen` has. To the resolver 127.1 is short for 127.0.0.1, to who compares names it is one.
+    # The name that `listen` has. The resolver takes 127.1 for 127.0.0.1; as a name it is only itself.
     Listen("LocalHost", range(1)): {"localhost": 200},
     Listen("127.1", range(1)): {"127.1": 200},
 }
@@ -118,7 +118,7 @@ def test_what_the_file_lists_and_whoever_can_reach_it_decide_which_names_are_ans
 
 
 def is_loopback(host: str) -> bool:
-    """What hosts.py decides, slowly: by what is written, one part after the other."""
+    """Whether a host is this machine: a slow reference that shares no code with hosts.py."""
     text = re.sub(r":[0-9]{0,5}$", "", host.lower()) if "]" in host or host.count(":") == 1 else host.lower()
     if text.startswith("[") and text.endswith("]"):
         return re.sub(r"%[a-z0-9._~-]+$", "", text[1:-1]) in {"::1", "0:0:0:0:0:0:0:1", "::ffff:7f00:1"}
@@ -144,7 +144,7 @@ hosts = st.one_of(
         zone=st.sampled_from(["", "%lo", "%25eth0", "%a%b", "% "]),
         port=st.sampled_from(["", ":", ":9464", ":00080"]),
     ),
-    # What a few letters make of a right one.
+    # Texts of the letters of valid hosts.
     st.text(st.sampled_from("localhost127.0.0.1[:]%@,/\\\t evil"), max_size=12),
 )
 in_target = hosts.filter(lambda host: re.fullmatch(r"[!-~]+", host) and not set(host) & set("/\\?#"))

@@ -1,4 +1,4 @@
-"""The state as Prometheus metrics: a text that its own parser reads, and counters that add up."""
+"""The state as Prometheus metrics: Prometheus's own parser reads them, and counters add up."""
 
 import re
 from dataclasses import replace
@@ -17,7 +17,7 @@ _SILENT = Finding(Code.SILENT, Severity.WARN, "/camera has been silent for 7 s",
 
 
 def samples(state):
-    """All samples of a scrape: (name, labels) to value."""
+    """The values of a scrape by name and labels."""
     text = generate_latest(registry(lambda: state)).decode()
     families = text_string_to_metric_families(text)
     return {(each.name, frozenset(each.labels.items())): each.value for family in families for each in family.samples}

@@ -1,4 +1,4 @@
-"""The page at the relay's root in a real Chromium: what it shows, and what one can do there."""
+"""The relay's page in a real Chromium: what it shows, and its controls."""
 
 import random
 from collections.abc import Iterator

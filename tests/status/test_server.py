@@ -1,4 +1,4 @@
-"""The relay's HTTP over real sockets: what it answers, and whom it does not wait for."""
+"""The relay's HTTP server over real sockets: its answers, and that no client can block it."""
 
 import json
 import re
@@ -143,7 +143,7 @@ def test_garbage_is_a_bad_request_and_the_server_lives_on(garbage):
 def test_a_header_without_end_is_refused():
     with serving(HEALTHY) as address:
         endless = b"GET / HTTP/1.1\r\nHost: localhost\r\n" + b"X-Long: " + b"x" * 40_000
-        # What it has not read by then may turn the end into a reset, before the answer is seen.
+        # Unread data may cause a reset before the client has read the answer.
         with suppress(ConnectionError):
             assert b" 431 " in sent(address, endless).partition(b"\r\n")[0]
         assert asked(address, "/livez")[0] == 200
@@ -219,7 +219,7 @@ def test_an_address_that_this_machine_does_not_have_is_an_error_that_names_it(ho
 def test_of_several_ports_the_first_free_one_is_taken():
     with Server(ANY) as first:
         port = first.place.port
-        # The next one is free most likely, and one of those that follow all but surely.
+        # One of the next 50 ports is free.
         with Server(Listen("127.0.0.1", range(port, min(port + 50, 65_536)))) as second:
             assert port < second.place.port < port + 50
 

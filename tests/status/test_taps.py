@@ -1,4 +1,4 @@
-"""What a tap is told, over real sockets: each line once, in order, or how many it has missed."""
+"""What taps receive: each line once and in order, or how many they missed."""
 
 import itertools
 import json
@@ -48,7 +48,7 @@ class Reader:
 
 @pytest.fixture
 def taps() -> Taps:
-    """Taps that may take all of the processor, as long as a test lasts."""
+    """Taps without a limit on their share of the processor."""
     return Taps(Tape(), lambda topic: f"/robot{topic}", processor_s=lambda: 0.0)
 
 
@@ -220,7 +220,7 @@ def test_a_tap_is_answered_over_http():
         assert code == 200
         assert len(json.loads(body)["lines"]) == 2
         assert asked(address, f"/tap?tap=b&group={GROUP.name}")[0] == 200
-        # Its group may have gone with a reload, and may come back.
+        # A reload may have removed its group and may bring it back.
         assert asked(address, "/tap?tap=b&group=gone&after=0")[0] == 200
         assert asked(address, "/tap?tap=a&after=0", host="evil.example")[0] == 403
 
@@ -241,7 +241,7 @@ def test_what_is_noted_while_it_is_read_is_neither_lost_nor_told_twice(taps):
     reader, count = Reader(taps), 20_000
     noting = threading.Thread(target=note, args=(taps, count))
     usual = sys.getswitchinterval()
-    # The threads take turns at every step that they can.
+    # Switch threads as often as possible.
     sys.setswitchinterval(1e-6)
     try:
         noting.start()

@@ -1,4 +1,4 @@
-"""States of relays as they come about: simulated sensors through the real engine, watched as the relay watches it."""
+"""States of relays: simulated sensors through the real engine, observed as the relay observes it."""
 
 import random
 from collections.abc import Iterator, Mapping
@@ -19,7 +19,7 @@ from syncrelay.sync import Match, Message
 
 MS = 1_000_000
 S = 1_000_000_000
-# As long as the relay takes to find who is there.
+# How long a relay takes to discover publishers.
 _DISCOVERED_S = 4
 _BEGAN = 1_760_000_000 * S
 _RECENT = 256
@@ -29,7 +29,7 @@ _RECENT = 256
 class Sensor:
     """Publishes from the start until `until_s`; stamps are `behind_ms` behind the clock, receipt `lag_ms` later.
 
-    Between the begin and end of each of `gaps_ms` it publishes nothing.
+    It publishes nothing within `gaps_ms`.
     """
 
     rate_hz: float
@@ -54,7 +54,7 @@ def simulated(
     node: str = "/syncrelay",
     phase: Phase = Phase.RUNNING,
 ) -> RelayState:
-    """The state of a relay that ran for so long on a file, with a sensor for each topic that has one."""
+    """The state of a relay after so many seconds; a topic without a sensor has no publisher."""
     groups = tuple(_report(group, sensors, seconds, random.Random(seed)) for group in load_text(config).groups)
     return RelayState(
         node=node,

@@ -1,4 +1,4 @@
-"""Servers that speak as they please: what may listen where a relay is looked for."""
+"""Servers that are not relays, and may send anything."""
 
 import socket
 from collections.abc import Callable, Iterator
@@ -11,26 +11,26 @@ Speech = Callable[[], Iterator[bytes]]
 
 @contextmanager
 def speaking(speech: Speech) -> Iterator[str]:
-    """The base URL of a server that says this to everyone who connects, and hangs up at its end."""
+    """The base URL of a server that sends this on each connection and then closes it."""
     with closing(socket.create_server(("127.0.0.1", 0), backlog=128)) as listener:
         Thread(target=_accept, args=(listener, speech), daemon=True).start()
         try:
             yield f"http://127.0.0.1:{listener.getsockname()[1]}"
         finally:
-            # Closing it alone would not wake who waits in accept.
+            # close() alone would not wake the thread in accept().
             listener.shutdown(socket.SHUT_RDWR)
 
 
 @contextmanager
 def answering(*bodies: bytes) -> Iterator[str]:
-    """The base URL of a server that answers with these in turn, whatever it is asked for, and then with the last."""
+    """The base URL of a server that answers each request with the next of these, and finally always with the last."""
     left = list(bodies)
     with speaking(lambda: iter([HEAD, left.pop(0) if len(left) > 1 else left[0]])) as url:
         yield url
 
 
 def slowly(chunk: bytes) -> Iterator[bytes]:
-    """The same without end, well within anyone's patience for the next of it."""
+    """The same chunk again and again, with pauses shorter than any timeout."""
     pause = Event()
     while not pause.wait(0.02):
         yield chunk
@@ -52,7 +52,7 @@ def _speak(client: socket.socket, speech: Speech) -> None:
     with closing(client), suppress(OSError):
         for chunk in speech():
             client.sendall(chunk)
-        # Else the end would be a reset, where the request has not been read.
+        # Otherwise the client gets a reset if its request was not read.
         client.shutdown(socket.SHUT_WR)
         while client.recv(65_536):
             pass

@@ -12,7 +12,7 @@ IMAGE, CLOUD, IMU = "sensor_msgs/msg/Image", "sensor_msgs/msg/PointCloud2", "sen
 
 
 def group(topics: Mapping[str, str | None], **keys) -> dict:
-    """A group of topics by name with their types; None for one that the graph has to tell."""
+    """A group of topics with their types; None for a type that comes from the graph."""
     listed = [{"topic": topic, **({"type": type_name} if type_name else {})} for topic, type_name in topics.items()]
     return {"policy": "approximate_time", "slop": "20ms", "queue_size": 10, **keys, "topics": listed}
 
@@ -35,7 +35,7 @@ def healthy() -> RelayState:
 
 @cache
 def rig() -> RelayState:
-    """Four groups: one healthy, one whose camera's clock is off, one with a queue too short, one without a radar."""
+    """Four groups: a healthy one, one whose camera has another clock, one with a short queue, one without a radar."""
     groups = {
         "front": group({"/camera/image_raw": IMAGE, "/lidar/points": CLOUD}),
         "rear": group({"/rear/image_raw": IMAGE, "/lidar/points": CLOUD}),

@@ -1,10 +1,10 @@
-"""A headless terminal and the person before it."""
+"""A user at a headless terminal."""
 
 import time
 
 
 class Terminal:
-    """A person at a terminal: reads lines, presses keys."""
+    """Reads the lines of a screen and presses keys."""
 
     def __init__(self, app, pilot):
         self.app, self.pilot = app, pilot

@@ -1,4 +1,4 @@
-"""Asking for the state over real sockets: a relay, nobody, somebody else, somebody who never comes to an end."""
+"""Requests for the state over real sockets: to a relay, a closed port, other servers, servers that never finish."""
 
 import random
 import re
@@ -15,13 +15,13 @@ from tests.top import states
 from tests.top.speaker import HEAD, answering, slowly, speaking, without_end
 
 _USUAL = [f":{port}" for port in range(9464, 9474)]
-# For a machine that others use too.
+# Enough on a busy machine.
 _PATIENT = {"timeout_s": 60, "whole_s": 60}
 
 
 @pytest.fixture
 def closed():
-    """The URL of a port at which nobody listens any more."""
+    """The URL of a closed port."""
     with closing(socket.create_server(("127.0.0.1", 0))) as opened:
         number = opened.getsockname()[1]
     return f"http://127.0.0.1:{number}"
@@ -87,7 +87,7 @@ def test_who_answers_something_else_is_no_relay_and_writes_nothing_to_the_termin
 
 
 def test_any_noise_is_an_error_of_ours():
-    """A document that is damaged at a few places, and lines that are no HTTP."""
+    """Documents and HTTP heads that are damaged in a few places."""
     chance = random.Random(15)
     whole = HEAD + status_of(states.rig()).as_json()
     damaged = b""
@@ -150,7 +150,7 @@ def test_a_search_finds_relays_and_tells_what_else_answers(closed):
 
 
 def test_relays_are_found_among_fifty_that_hang_or_never_end():
-    # Those that never end take all of a core: two leave the relays, which share this process, their turn.
+    # Each that never ends takes a core; with more than two, the relays in this process would not get their turn.
     speeches = [*[lambda: without_end(b"x")] * 2]
     speeches += [
         speech for _ in range(16) for speech in (lambda: slowly(b"H"), lambda: iter([b"?"]), lambda: slowly(b""))
@@ -159,7 +159,7 @@ def test_relays_are_found_among_fifty_that_hang_or_never_end():
         urls = [stack.enter_context(speaking(speech)) for speech in speeches]
         relays = [stack.enter_context(running(states.healthy())).url for _ in range(2)]
         for patience_s in (3, 10, 40):
-            # At last long enough for a relay on a machine that others use too.
+            # The longest is enough on a busy machine.
             found = search([*urls[:25], *relays, *urls[25:]], timeout_s=patience_s, whole_s=patience_s)
             if len(found.relays) == len(relays):
                 break

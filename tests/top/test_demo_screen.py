@@ -1,4 +1,4 @@
-"""What the demo shows of its relay, of rigs in virtual time."""
+"""What the demo shows of its relay, on rigs in virtual time."""
 
 import io
 import re
@@ -23,7 +23,7 @@ RIG = {
 
 @cache
 def moment(*without, seconds=12, total_s=20.0):
-    """The demo's file at work on its sensors, but for some."""
+    """A moment of the demo, without some of its sensors."""
     state = simulated(
         shipped_config(), {topic: each for topic, each in RIG.items() if topic not in without}, seconds=seconds
     )

@@ -1,4 +1,4 @@
-"""The screens by their text, on a headless terminal, with a relay's HTTP on a real socket."""
+"""The text of the screens, on a headless terminal, with the relay's server."""
 
 import asyncio
 import re
@@ -19,7 +19,7 @@ _SMALL, _WIDE = (80, 24), (160, 45)
 
 
 def before(*told, size=_SMALL):
-    """Have a test be what a user does at a terminal, while there is a relay of each state."""
+    """Run a coroutine as a user at a terminal, with a relay in each of these states."""
 
     def sit(act):
         async def look():
@@ -47,7 +47,7 @@ def at_terminal(state, *keys, size=_SMALL):
 
 
 def _begins_with(sentence, line):
-    """Whether a line is the beginning of a sentence, which goes on below."""
+    """Whether a line is the beginning of a sentence that continues on the next line."""
     return len(line) > 40 and sentence.startswith(line)
 
 

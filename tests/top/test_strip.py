@@ -1,4 +1,4 @@
-"""Strips of hand-written groups, drawn as they are seen."""
+"""Strips of groups written by hand."""
 
 # ruff: noqa: RUF001  the marks are what they look like
 
@@ -22,7 +22,7 @@ def a_drop(lane, stamp_ms, reason=DropReason.SUPERSEDED, *, unneeded=None):
 
 
 def drawn(recent, window=_WINDOW, *, inputs=2, sets=None):
-    """The lines of a group that has given just its recent sets, unless said otherwise."""
+    """The lines of a strip; by default the group has given no sets before the recent ones."""
     given = sum(hasattr(each, "stamps") for each in recent) if sets is None else sets
     return [line.plain.rstrip() for line in strip(recent, window, n_inputs=inputs, sets=given)]
 

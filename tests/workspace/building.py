@@ -14,7 +14,7 @@ COLCON = "SYNCRELAY_COLCON"
 
 
 class Workspace:
-    """A folder with src/, and after `colcon build` with install/; the venv that is active has a space in its path."""
+    """A folder with src/, and after `colcon build` with install/. The path of the active venv has a space."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -27,7 +27,7 @@ class Workspace:
         self.packages = self.prefix / "lib" / python / "site-packages"
 
     def colcon(self, *words: str) -> str:
-        """Run colcon as a user does where ROS is sourced and the tests' venv is active; what it says."""
+        """Run colcon as with ROS sourced and the tests' venv active; return what it prints."""
         ros = Path(os.environ[COLCON]).resolve()
         environment = _without_ours(os.environ) | {
             "PATH": os.pathsep.join([str(self.venv / "bin"), str(ros / "bin"), os.environ["PATH"]]),
@@ -78,5 +78,5 @@ def build(folder: Path) -> Workspace:
 
 
 def _without_ours(environment: Mapping[str, str]) -> dict[str, str]:
-    """A shell's environment in which nothing finds this checkout."""
+    """The environment without the variables that lead to this checkout."""
     return {name: value for name, value in environment.items() if name not in ("PYTHONPATH", COLCON)}

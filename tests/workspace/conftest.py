@@ -1,4 +1,4 @@
-"""Tests of a colcon workspace, run by `make test-workspace`, which installs a colcon; without, none is collected."""
+"""Tests of a colcon workspace. `make test-workspace` installs colcon and runs them; without it none is collected."""
 
 import os
 
@@ -11,5 +11,5 @@ collect_ignore_glob = [] if os.environ.get(COLCON) else ["test_*.py"]
 
 @pytest.fixture(scope="session")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    """A fresh workspace with this repository in its src/, built by colcon in a path with a space."""
+    """A workspace with this repository in src/, built by colcon in a path with a space."""
     return build(tmp_path_factory.mktemp("a workspace"))

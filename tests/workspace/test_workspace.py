@@ -1,4 +1,4 @@
-"""What a ROS user gets who clones syncrelay into a workspace: colcon builds it, and `ros2 run` and launch find it.
+"""syncrelay in a colcon workspace: colcon builds it, and `ros2 run` and launch find it.
 
 Neither ros2cli nor launch can be installed here: what they look for is checked, and what they start is started.
 """
@@ -74,7 +74,7 @@ def test_it_is_found_where_the_workspace_is_sourced(workspace: Workspace, tmp_pa
 
 
 def test_what_a_build_with_links_would_link_to_can_be_executed(workspace: Workspace):
-    # That build itself takes a minute: CMake makes each link by a script.
+    # A build with links takes a minute: CMake makes each link by a script.
     assert os.access(workspace.folder / "build" / "syncrelay" / "bin" / "syncrelay", os.X_OK)
 
 
@@ -99,7 +99,7 @@ def test_the_installed_executable_relays_the_demos_rig_and_is_reloaded_by_a_serv
     so_far = {output: collector.count(output) for output in _OUTPUTS}
     for output, count in so_far.items():
         collector.wait_for(output, count + 20)
-    # As from launch, whose terminal may send one more.
+    # As with launch, where the terminal may send another.
     relay.send(signal.SIGINT)
     relay.send(signal.SIGINT)
     assert relay.wait() == 0

@@ -1,4 +1,4 @@
-"""A server on a port of its own, and clients that speak to it in bytes."""
+"""The relay's server on a port of its own, and clients that send bytes."""
 
 import socket
 from collections.abc import Iterator

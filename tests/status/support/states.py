@@ -1,4 +1,4 @@
-"""States of a relay, built from the real watch over a group of a file."""
+"""States of a relay with known counts and spans, through the real GroupWatch."""
 
 from typing import Any
 
@@ -27,7 +27,7 @@ groups:
 
 
 def started(*, camera: tuple[Endpoint, ...] = (CAMERA,), lidar: tuple[Endpoint, ...] = (LIDAR,)) -> GroupReport:
-    """A group that nothing has come to yet."""
+    """A group that has received nothing yet."""
     return _report(_watch(), now=BEGAN, camera=camera, lidar=lidar)
 
 
