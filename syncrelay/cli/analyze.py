@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay analyze`."""
     parser = Parser(
         "syncrelay analyze",
         example="syncrelay analyze drive.mcap --config fusion.yaml",
@@ -57,7 +56,6 @@ def parser() -> Parser:
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
-    """Run `syncrelay analyze`."""
     from syncrelay.config import load_text
     from syncrelay.config.source import read_source
     from syncrelay.recordings.bag import is_recording

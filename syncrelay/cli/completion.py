@@ -37,7 +37,6 @@ _Completer = Callable[[str, Namespace], Iterable[str] | Mapping[str, str]]
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay completion`."""
     parser = Parser(
         "syncrelay completion",
         example="syncrelay completion fish > ~/.config/fish/completions/syncrelay.fish",
@@ -53,7 +52,6 @@ def parser() -> Parser:
 
 
 def command(_parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
-    """Run `syncrelay completion`."""
     put(shellcode([_PROGRAM], shell=arguments.shell).strip())
     return DONE
 

@@ -37,7 +37,6 @@ Show: TypeAlias = "Callable[[Moment], None]"
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay demo`."""
     parser = Parser(
         "syncrelay demo",
         example="syncrelay demo --seconds 30",

@@ -9,7 +9,6 @@ from syncrelay.cli.stop import StopRequest
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay diff`."""
     parser = Parser(
         "syncrelay diff",
         example="syncrelay diff fusion.yaml wider.yaml",

@@ -12,7 +12,6 @@ from syncrelay.cli.stop import StopRequest
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay doctor`."""
     parser = Parser(
         "syncrelay doctor",
         example="syncrelay doctor --config fusion.yaml --live",
@@ -36,7 +35,6 @@ def parser() -> Parser:
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
-    """Run `syncrelay doctor`."""
     if arguments.seconds and not arguments.live:
         parser.error("--seconds N needs --live: it is how long to observe the graph")
     parser.refuse_repeated(arguments.config)

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay export`."""
     parser = Parser(
         "syncrelay export",
         example="syncrelay export drive.mcap --config fusion.yaml -o dataset",
@@ -58,7 +57,6 @@ def parser() -> Parser:
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
-    """Run `syncrelay export`."""
     parser.refuse_repeated(arguments.config)
     if arguments.into is None:
         parser.error("the following arguments are required: -o/--output")

@@ -8,7 +8,6 @@ from syncrelay.cli.stop import StopRequest
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay graph`."""
     parser = Parser(
         "syncrelay graph",
         example="syncrelay graph fusion.yaml",
@@ -27,7 +26,6 @@ def parser() -> Parser:
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
-    """Run `syncrelay graph`."""
     from syncrelay.config import load
     from syncrelay.config.graph import as_mermaid, as_text, drawing_of
     from syncrelay.config.source import shown_name

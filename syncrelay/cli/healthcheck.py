@@ -70,7 +70,6 @@ def ailment(path: Path) -> str | None:
 
 
 def parser() -> "Parser":
-    """Return the parser of `syncrelay healthcheck`."""
     from syncrelay.cli.parser import Parser
 
     return Parser(
@@ -82,7 +81,6 @@ def parser() -> "Parser":
 
 
 def command(_parser: "Parser", _arguments: "Namespace", _stop: "StopRequest") -> int:
-    """Run `syncrelay healthcheck`."""
     return healthcheck()
 
 

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay init`."""
     parser = Parser(
         "syncrelay init",
         example="syncrelay init --from-bag drive.mcap -o fusion.yaml",

@@ -32,7 +32,6 @@ _ONE_FILE: Final = "--write goes with one --config FILE"
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay observe`."""
     parser = Parser(
         "syncrelay observe",
         example="syncrelay observe --config fusion.yaml --seconds 30",

@@ -23,7 +23,6 @@ _OTHERWISE: Final = "  If the relay's file says `metrics: null`, send SIGHUP to 
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay reload`."""
     parser = Parser(
         "syncrelay reload",
         example="syncrelay reload --url localhost:9464",

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay replay`."""
     parser = Parser(
         "syncrelay replay",
         example="syncrelay replay drive.mcap --config fusion.yaml -o sets.mcap",
@@ -39,10 +38,7 @@ def parser() -> Parser:
         "--config", metavar="FILE", required=True, help="the file with the groups, or a directory of files"
     )
     parser.add_argument(
-        "-o",
-        "--output",
-        metavar="OUT",
-        help="write the sets as a recording: OUT.mcap, or OUT as a rosbag2 folder",
+        "-o", "--output", metavar="OUT", help="write the sets as a recording: OUT.mcap, or OUT as a rosbag2 folder"
     )
     parser.add_argument("--json", action="store_true", help="print a line of JSON for each set")
     parser.add_argument("--drops", action="store_true", help="print a line of JSON for each message that is dropped")
@@ -58,7 +54,6 @@ def parser() -> Parser:
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
-    """Run `syncrelay replay`."""
     parser.refuse_repeated(arguments.config)
     from syncrelay.rig.what_if import parse_fault
 

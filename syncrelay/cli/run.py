@@ -33,7 +33,6 @@ _BUG: Final = (
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay --config FILE`."""
     from syncrelay.cli.commands import commands_help
 
     exit_codes = f"exit codes: {', '.join(f'{code} {means}' for code, means in EXIT_CODES.items())}"
@@ -47,11 +46,7 @@ def parser() -> Parser:
     parser.add_repeatable("--config", metavar="FILE", help="run groups of FILE, or a directory")
     parser.add_repeatable("--group", metavar="NAME", help="run this group only")
     add = parser.add_argument
-    add(
-        "--watch",
-        action="store_true",
-        help="read FILE again when it changes, not only at SIGHUP",
-    )
+    add("--watch", action="store_true", help="read FILE again when it changes, not only at SIGHUP")
     add(
         "--log-level",
         choices=("debug", "info", "warning", "error"),

@@ -9,7 +9,6 @@ from syncrelay.cli.stop import StopRequest
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay schema`."""
     parser = Parser(
         "syncrelay schema",
         example="syncrelay schema > syncrelay.json",
@@ -20,7 +19,6 @@ def parser() -> Parser:
 
 
 def command(_parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
-    """Run `syncrelay schema`."""
     if arguments.test:
         from syncrelay.recordings.cases.models import cases_schema
 

@@ -22,7 +22,6 @@ _ASKS_EVERY_S: Final = 0.25
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay tap`."""
     parser = Parser(
         "syncrelay tap",
         example="syncrelay tap front --reason late",

@@ -9,7 +9,6 @@ from syncrelay.cli.stop import StopRequest
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay test`."""
     parser = Parser(
         "syncrelay test",
         example="syncrelay test tests/fusion.yaml",
@@ -31,7 +30,6 @@ def parser() -> Parser:
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
-    """Run `syncrelay test`."""
     parser.refuse_repeated(arguments.files)
     from syncrelay.recordings.cases.checking import run_files
     from syncrelay.recordings.cases.reports import REPORTS, Talk, counts

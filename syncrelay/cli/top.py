@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay top`."""
     parser = Parser(
         "syncrelay top",
         example="syncrelay top --url robot:9464",
@@ -36,7 +35,6 @@ def parser() -> Parser:
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
-    """Run `syncrelay top`."""
     if arguments.json and not arguments.once:
         parser.error("--json goes with --once")
     from syncrelay.cli.relays import find, find_one, otherwise

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 
 def parser() -> Parser:
-    """Return the parser of `syncrelay validate`."""
     parser = Parser(
         "syncrelay validate",
         example="syncrelay validate fusion.yaml",
@@ -54,7 +53,6 @@ class Checked:
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
-    """Run `syncrelay validate`."""
     files = arguments.files
     parser.refuse_repeated(files if arguments.together else [each for each in files if each == "-"])
     found = [_check(each) for each in ([files] if arguments.together else [[file] for file in files])]

@@ -6,10 +6,14 @@ No ROS is needed, so that the rig can be recorded where none is installed: three
 import math
 import struct
 import sys
-from array import array
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Final, Self
+from typing import TYPE_CHECKING, Final, Self
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 IMAGE: Final = "sensor_msgs/msg/Image"
 POINT_CLOUD: Final = "sensor_msgs/msg/PointCloud2"
@@ -30,50 +34,38 @@ _IMU_SAMPLES = 200
 
 def images() -> tuple[bytes, ...]:
     """Serialized 640x480 rgb8 `sensor_msgs/msg/Image`s with stamp 0: diagonal colours that slide to the left."""
-    row = b"".join(_rainbow(x / WIDTH) for x in range(WIDTH)) * 3
+    turns = np.arange(3 * WIDTH)[:, None] / WIDTH + np.arange(3) / 3
+    row = np.rint(127.5 + 127.5 * np.cos(math.tau * turns)).astype(np.uint8)
     return tuple(_image(row, shift=WIDTH * frame // _IMAGES) for frame in range(_IMAGES))
 
 
-def _rainbow(turn: float) -> bytes:
-    return bytes(round(127.5 + 127.5 * math.cos(math.tau * (turn + third / 3))) for third in range(3))
-
-
-def _image(row: bytes, *, shift: int) -> bytes:
-    step = 3 * WIDTH
-    pixels = b"".join(row[3 * (shift + y) : 3 * (shift + y) + step] for y in range(HEIGHT))
+def _image(row: "NDArray[np.uint8]", *, shift: int) -> bytes:
+    pixels = b"".join(row[shift + y : shift + y + WIDTH].tobytes() for y in range(HEIGHT))
     message = _Message("camera").numbers("I", HEIGHT, WIDTH).text("rgb8")
-    return message.numbers("B", 0).numbers("I", step).sequence(pixels).content()
+    return message.numbers("B", 0).numbers("I", 3 * WIDTH).sequence(pixels).content()
 
 
 def clouds() -> tuple[bytes, ...]:
     """Serialized `sensor_msgs/msg/PointCloud2`s with stamp 0: 20,000 points of a square room, a bright beam turning."""
-    room = _room()
-    return tuple(_cloud(room, beam=math.tau * frame / _CLOUDS) for frame in range(_CLOUDS))
+    azimuths = math.tau * np.arange(POINTS_PER_RING) / POINTS_PER_RING
+    x, y = np.cos(azimuths), np.sin(azimuths)
+    # On the walls of a room 12 m square, ring by ring.
+    distance = 6 / np.maximum(abs(x), abs(y))
+    points = np.empty((RINGS, POINTS_PER_RING, len(_FIELDS)), np.float32)
+    points[..., 0], points[..., 1] = x * distance, y * distance
+    points[..., 2] = np.tan(np.radians(2 * np.arange(RINGS) - 15))[:, None] * distance
+    messages = []
+    for frame in range(_CLOUDS):
+        points[..., 3] = 255 * (0.5 + 0.5 * np.cos(azimuths - math.tau * frame / _CLOUDS)) ** 8
+        messages.append(_cloud(points.tobytes()))
+    return tuple(messages)
 
 
-def _azimuths() -> list[float]:
-    return [math.tau * step / POINTS_PER_RING for step in range(POINTS_PER_RING)]
-
-
-def _room() -> "array[float]":
-    """Return x, y, z and a place for the intensity of points on the walls of a room 12 m square, ring by ring."""
-    points = array("f")
-    for ring in range(RINGS):
-        rise = math.tan(math.radians(2 * ring - 15))
-        for azimuth in _azimuths():
-            x, y = math.cos(azimuth), math.sin(azimuth)
-            distance = 6 / max(abs(x), abs(y))
-            points.extend((x * distance, y * distance, rise * distance, 0))
-    return points
-
-
-def _cloud(room: "array[float]", *, beam: float) -> bytes:
-    points = room[:]
-    points[3::4] = array("f", [255 * (0.5 + 0.5 * math.cos(azimuth - beam)) ** 8 for azimuth in _azimuths()] * RINGS)
+def _cloud(points: bytes) -> bytes:
     message = _Message("lidar").numbers("I", RINGS, POINTS_PER_RING, len(_FIELDS))
     for place, name in enumerate(_FIELDS):
         message.text(name).numbers("I", 4 * place).numbers("B", _FLOAT32).numbers("I", 1)
-    message.numbers("B", sys.byteorder == "big").numbers("I", 16, 16 * POINTS_PER_RING).sequence(points.tobytes())
+    message.numbers("B", sys.byteorder == "big").numbers("I", 16, 16 * POINTS_PER_RING).sequence(points)
     is_dense = True
     return message.numbers("B", is_dense).content()
 
