@@ -17,7 +17,7 @@ from syncrelay.recordings.cases.models import (
 )
 from tests.cli.command import ROOT
 from tests.config.test_schema import parsed
-from tests.recordings.cases.mutants import CONFIGS
+from tests.recordings.cases.test_examples import CONFIGS
 
 SCHEMA = cases_schema()
 VALIDATOR = Draft7Validator(SCHEMA)
