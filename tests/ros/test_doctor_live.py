@@ -60,7 +60,8 @@ def examine(
         argv = [*REPORTS, str(path), "--seconds", f"{look_s}", *words]
         examined = run([sys.executable, "-m", "syncrelay", "doctor", *argv], stage.environment)
         assert ours_of(examined.talk) == []
-        if until(examined):
+        # A publisher is found before the name of its node.
+        if until(examined) and "whose node is not known yet" not in str(examined.report):
             break
     return examined
 
@@ -177,9 +178,9 @@ def test_nodes_of_another_user_are_told_from_nodes_that_are_not_there(stage: Sta
         words = ["doctor", "--seconds", f"{look_s}", *REPORTS, str(stage.folder / "doctor.yaml")]
         examined = run(unshared(["mount"], OTHER_USER.format(player=player, caps=MAY_READ), *words), environment)
         said = {each["code"]: each for each in examined.report["diagnoses"]}
-        if {"shm_foreign", "unreachable"} <= set(said):
+        if "shm_foreign" in said and said.get("unreachable", {"what": ""})["what"].startswith("2 topics on domain"):
             break
-    assert {"shm_foreign", "unreachable"} <= set(said)
+    assert "shm_foreign" in said
     assert said["unreachable"]["what"].startswith("2 topics on domain")
     assert {"alone", "silent", "no_publisher"}.isdisjoint(said)
     nodes = {each["node"] for topic in topics_of(examined.report) for each in topic["publishers"]}
@@ -208,7 +209,11 @@ def test_simulated_time_is_no_fault_and_one_that_is_not_used_is_told(stage: Stag
     player.start(merged(frames, ticks), speed=1)
     groups = {"front": {**group("/camera", "/lidar", policy="approximate_time"), "slop": "1s"}}
     _, problems, *_ = examine(stage, config(groups, node={"use_sim_time": True}), until=all_arrives)
-    _, wall_problems, off_clock, _ = examine(stage, config(groups), until=all_arrives)
+    _, wall_problems, off_clock, _ = examine(
+        stage,
+        config(groups),
+        until=lambda seen: all_arrives(seen) and "clock_unused" in codes(seen.report["diagnoses"]),
+    )
     assert (problems, wall_problems) == ([], [])
     assert "clock_unused" in codes(off_clock["diagnoses"])
 
@@ -217,7 +222,9 @@ def test_a_relay_of_the_same_name_is_seen_and_is_told_nothing_of_the_look(stage:
     text = config({"front": group("/camera", "/lidar")})
     relay = stage.relay(text)
     relay.wait_for_log("waiting for")
-    _, problems, report, _ = examine(stage, text, until=lambda seen: "node_name" in codes(seen.report["diagnoses"]))
+    _, problems, report, _ = examine(
+        stage, text, until=lambda seen: {"node_name", "no_publisher"} <= set(codes(seen.report["diagnoses"]))
+    )
     assert "no_publisher" in codes(problems)
     assert not {"alone", "output_taken"} & set(codes(problems))
     assert "node_name" in codes(report["diagnoses"])

@@ -186,7 +186,7 @@ def test_a_faulty_file_fails_to_configure_and_a_mended_one_is_what_runs(stage: S
     relay.send(signal.SIGHUP)
     wait_until(lambda: len(status(relay)["groups"]) == 2, "the groups of a file that is reloaded while inactive")
     assert manager.state == "inactive"
-    assert problems(relay, "side") == {"inactive"}
+    wait_until(lambda: problems(relay, "side") == {"inactive"}, "the finding and no other")
     _end(relay, signal.SIGINT)
 
 

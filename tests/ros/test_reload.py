@@ -78,9 +78,8 @@ def test_several_files_run_as_one_and_each_is_watched(stage: Stage):
     second.write_text(config({"rear": _rear()}))
     file = ReloadedFile(stage, "--config", str(second), "--watch", front=_FRONT)
     file.relay.wait_for_log("rear: waiting for")
-    state = status(file.relay)
-    assert [group["name"] for group in state["groups"]] == ["front", "rear"]
-    assert state["relay"]["config"] == f"{file.path}, {second}"
+    wait_until(lambda: [each["name"] for each in status(file.relay)["groups"]] == ["front", "rear"], "both groups")
+    assert status(file.relay)["relay"]["config"] == f"{file.path}, {second}"
     second.write_text(config({"rear": _rear(), "left": _rear(output_prefix="/left")}))
     file.relay.wait_for_log("reloaded: 2 groups unchanged; ")
     file.write(config({"left": _FRONT}, metrics=ANY_PORT))
