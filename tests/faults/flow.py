@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tests.faults.laws import Pairing
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.processes import DEADLINE_S, Process, wait_until
@@ -85,18 +84,16 @@ class Rig:
     stage: Stage
     topics: tuple[str, ...] = ("/camera", "/lidar")
     slop: int = 4 * MS
-    pairing: Pairing = Pairing.BY_STAMP
     before: tuple[str, ...] = ()
 
     def relay(self, *, keys: Mapping[str, Any] | None = None, qos: Mapping[str, Any] | None = None) -> Process:
         """A relay of the group with these keys, whose inputs have this QoS."""
         topics = inputs(dict.fromkeys(self.topics, VECTOR), **({"qos": qos} if qos else {}))
-        restamp = {"restamp": "earliest"} if self.pairing is Pairing.BY_STAMP else {}
         group = {
             "policy": "approximate_time",
             "slop": f"{self.slop}ns",
             "queue_size": 50,
-            **restamp,
+            "restamp": "earliest",
             **(keys or {}),
             "topics": topics,
         }
@@ -111,7 +108,7 @@ class Rig:
     def witness(self, *, node: str = "witness", **options: Any) -> Witness:
         """A process that checks what comes out of the group."""
         outputs = [word for topic in self.topics for word in ("--output", topic, f"/front{topic}")]
-        argv = [*outputs, f"--node={node}", f"--slop={self.slop}", f"--pairing={self.pairing.value}"]
+        argv = [*outputs, f"--node={node}", f"--slop={self.slop}"]
         return Witness(self._start("witness", [*argv, *_options(options)]))
 
     def _start(self, name: str, argv: Sequence[str]) -> Process:

@@ -1,8 +1,6 @@
 """What is so of every set that comes out, whatever happened to those who sent, relayed and received it."""
 
-from collections import deque
 from collections.abc import Sequence
-from enum import Enum
 
 from tests.faults.certified import sent_stamp
 from tests.ros.cdr_messages import stamp_of
@@ -12,33 +10,22 @@ _PENDING = 20_000
 _FAULTS_TOLD = 10
 
 
-class Pairing(Enum):
-    """How messages of one set are known on outputs."""
-
-    BY_PLACE = "by_place"
-    """The n-th of one output belongs to the n-th of the others: for who is there from the first set and loses none."""
-    BY_STAMP = "by_stamp"
-    """The relay gives them one stamp, that of the earliest: for whoever comes late or over a network that loses."""
-
-
 class SetLaw:
     """Takes certified messages as they come out and notes what is wrong.
 
     Each is byte for byte one that was sent on its topic; none comes twice, none is older than one before it; the
-    messages of a set are no farther apart than slop.
+    messages of a set have its earliest stamp, by which they are known, and are no farther apart than slop.
     """
 
-    def __init__(self, topics: Sequence[str], *, slop: int, pairing: Pairing) -> None:
+    def __init__(self, topics: Sequence[str], *, slop: int) -> None:
         self.messages = [0] * len(topics)
         self.sets = 0
         self.faults: list[str] = []
         self.last_set: int | None = None
-        """The common stamp of the last set that came whole, or its earliest message's."""
+        """The common stamp of the last set that came whole."""
         self._topics = topics
         self._slop = slop
         self._newest: list[int | None] = [None] * len(topics)
-        self._pair = self._pair_by_stamp if pairing is Pairing.BY_STAMP else self._pair_by_place
-        self._waiting: list[deque[int]] = [deque() for _ in topics]
         self._pending: dict[int, dict[int, int]] = {}
 
     @property
@@ -60,29 +47,20 @@ class SetLaw:
         self._newest[index] = stamp
         self._pair(index, stamp, stamp_of(payload))
 
-    def _pair_by_place(self, index: int, stamp: int, header_stamp: int) -> None:
-        if header_stamp != stamp:
-            self._fault(f"{self._topics[index]}: {stamp} left with the stamp {header_stamp}")
-        self._waiting[index].append(stamp)
-        if all(self._waiting):
-            self._judge([waiting.popleft() for waiting in self._waiting])
-
-    def _pair_by_stamp(self, index: int, stamp: int, header_stamp: int) -> None:
+    def _pair(self, index: int, stamp: int, header_stamp: int) -> None:
         stamps = self._pending.setdefault(header_stamp, {})
         stamps[index] = stamp
         if len(stamps) == len(self._topics):
             del self._pending[header_stamp]
             if min(stamps.values()) != header_stamp:
                 self._fault(f"a set of {sorted(stamps.values())} left with the stamp {header_stamp}")
-            self._judge([stamps[each] for each in sorted(stamps)])
+            self.sets += 1
+            self.last_set = header_stamp
+            span = max(stamps.values()) - min(stamps.values())
+            if span > self._slop:
+                self._fault(f"a set spans {span} ns, slop is {self._slop}: {sorted(stamps.values())}")
         elif len(self._pending) > _PENDING:
             del self._pending[next(iter(self._pending))]
-
-    def _judge(self, stamps: Sequence[int]) -> None:
-        self.sets += 1
-        self.last_set = min(stamps)
-        if max(stamps) - min(stamps) > self._slop:
-            self._fault(f"a set spans {max(stamps) - min(stamps)} ns, slop is {self._slop}: {stamps}")
 
     def _fault(self, text: str) -> None:
         if len(self.faults) < _FAULTS_TOLD:

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.faults.certified import certified, sent_stamp
-from tests.faults.laws import Pairing, SetLaw
+from tests.faults.laws import SetLaw
 from tests.ros.cdr_messages import with_stamp
 
 TOPICS = ["/camera", "/lidar"]
@@ -11,8 +11,8 @@ T = 1_700_000_000_000_000_000
 SLOP = 10
 
 
-def judged(*messages: tuple[int, bytes], pairing: Pairing = Pairing.BY_PLACE) -> SetLaw:
-    law = SetLaw(TOPICS, slop=SLOP, pairing=pairing)
+def judged(*messages: tuple[int, bytes]) -> SetLaw:
+    law = SetLaw(TOPICS, slop=SLOP)
     for index, payload in messages:
         law.take(index, payload)
     return law
@@ -48,11 +48,8 @@ def test_a_message_of_another_topic_or_length_was_not_sent():
     assert sent_stamp("/camera", certified("/camera", T)[:-1]) is None
 
 
-@pytest.mark.parametrize("pairing", Pairing)
-def test_right_sets_are_counted(pairing: Pairing):
-    first = T if pairing is Pairing.BY_STAMP else T + SLOP
-    second = restamped(lidar(T + SLOP), first)
-    law = judged(camera(T), second, camera(T + 100), lidar(T + 100), camera(T + 200), pairing=pairing)
+def test_right_sets_are_counted():
+    law = judged(camera(T), restamped(lidar(T + SLOP), T), camera(T + 100), lidar(T + 100), camera(T + 200))
     assert (law.sets, law.messages, law.unpaired, law.last_set, law.faults) == (2, [3, 2], 1, T + 100, [])
 
 
@@ -61,16 +58,14 @@ def test_right_sets_are_counted(pairing: Pairing):
     [
         ([camera(T), camera(T)], f"/camera: {T} comes again"),
         ([camera(T), camera(T - 1)], f"/camera: {T - 1} comes after {T}"),
-        ([camera(T), lidar(T + SLOP + 1)], f"a set spans {SLOP + 1} ns, slop is {SLOP}: [{T}, {T + SLOP + 1}]"),
-        ([restamped(camera(T), T + 1)], f"/camera: {T} left with the stamp {T + 1}"),
+        (
+            [camera(T), restamped(lidar(T + SLOP + 1), T)],
+            f"a set spans {SLOP + 1} ns, slop is {SLOP}: [{T}, {T + SLOP + 1}]",
+        ),
+        ([restamped(camera(T), T + 5), lidar(T + 5)], f"a set of [{T}, {T + 5}] left with the stamp {T + 5}"),
         ([(0, b"\0\1\0\0")], "/camera: nobody sent 00010000"),
     ],
     ids=["a message twice", "a step back", "a span over slop", "another stamp", "another message"],
 )
 def test_what_is_wrong_is_told(messages, fault: str):
     assert judged(*messages).faults == [fault]
-
-
-def test_a_common_stamp_that_is_not_the_earliest_is_told():
-    law = judged(restamped(camera(T), T + 5), lidar(T + 5), pairing=Pairing.BY_STAMP)
-    assert law.faults == [f"a set of [{T}, {T + 5}] left with the stamp {T + 5}"]

@@ -6,7 +6,6 @@ import pytest
 
 from tests.faults.extent import chosen
 from tests.faults.flow import MS, Rig, accounts, wait_until_received
-from tests.faults.laws import Pairing
 from tests.faults.vitals import descriptors, memory_mb
 from tests.ros.configs import LOSSLESS
 from tests.ros.processes import DEADLINE_S, Process, wait_until
@@ -27,7 +26,7 @@ _GROWTH_MB = 10
 
 @pytest.mark.timeout(chosen(short=600, long=2400))
 def test_nothing_is_lost_and_nothing_grows(stage: Stage, figures):
-    rig = Rig(stage, topics=_TOPICS, slop=MS // 4, pairing=Pairing.BY_PLACE)
+    rig = Rig(stage, topics=_TOPICS, slop=MS // 4)
     relay = rig.relay(qos=LOSSLESS, keys={"queue_size": _QUEUE})
     witness, source = rig.witness(), rig.source()
     source.match()

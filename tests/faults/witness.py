@@ -23,7 +23,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import get_default_context
 
 from syncrelay.ros.leaving import leave
-from tests.faults.laws import Pairing, SetLaw
+from tests.faults.laws import SetLaw
 
 _POLL_S = 0.01
 # The number of files that wait for a command, and whether there is one, is looked at this often at least.
@@ -39,7 +39,7 @@ def main() -> None:
     profile = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy[arguments.reliability.upper()])
     topics, outputs = zip(*arguments.output, strict=True)
     subscriptions = [node.create_subscription(Vector3Stamped, each, print, profile, raw=True) for each in outputs]
-    law = SetLaw(topics, slop=arguments.slop, pairing=Pairing(arguments.pairing))
+    law = SetLaw(topics, slop=arguments.slop)
     wait_set = _rclpy.WaitSet(len(outputs), 0, 0, 0, 0, 0, rclpy.get_default_context().handle)
     while True:
         if select.select([sys.stdin], [], [], 0)[0]:
@@ -63,7 +63,6 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", nargs=2, action="append", required=True, metavar=("INPUT", "OUTPUT"))
     parser.add_argument("--slop", type=int, required=True, help="in nanoseconds")
-    parser.add_argument("--pairing", default=Pairing.BY_STAMP.value)
     parser.add_argument("--node", default="witness")
     parser.add_argument("--reliability", default="reliable")
     return parser
