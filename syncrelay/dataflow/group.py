@@ -3,19 +3,18 @@
 import logging
 import time
 from collections import deque
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping
 from contextlib import suppress
-from typing import Final, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 from syncrelay.config import GroupConfig
 from syncrelay.config.installed import policy_name, suspects
 from syncrelay.dataflow.backend import Outlet
 from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
-from syncrelay.dataflow.flow import Engine, Flow
+from syncrelay.dataflow.flow import Engine, Flow, Refusals, Unpublished
 from syncrelay.dataflow.manifest_queue import GroupManifests
-from syncrelay.dataflow.refusals import Refusals, Unpublished
 from syncrelay.explain import Code, RecentDrop, Stamps, Tape
-from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
+from syncrelay.sync import DropReason, SyncGroup
 from syncrelay.sync.counts import InputCounts
 
 _LOG = logging.getLogger("syncrelay")
@@ -23,7 +22,6 @@ _Result = TypeVar("_Result")
 
 # What is held while a group is suspended, which takes some tenths of a second.
 _HELD = 10_000
-_NONE_UNPUBLISHED: Final[dict[int, str]] = {}
 
 
 class Batch(NamedTuple):
@@ -135,8 +133,12 @@ class GroupRelay:
         if lacks:
             self.flush(DropReason.SHUTDOWN)
         try:
-            for message, reason in self._held_by.held:
-                self.flow.conclude(self._resumed(message, DropReason.SHUTDOWN if lacks else reason))
+            for message, held_for in self._held_by.held:
+                reason = DropReason.SHUTDOWN if lacks else held_for
+                if reason is not None:
+                    self.flow.conclude((self.engine.reject(message, reason),))
+                else:
+                    self.flow.conclude(self.engine.add(message, now=self._now()))
         except Exception as error:  # noqa: BLE001  it is this group's alone
             self.fail(error)
 
@@ -148,11 +150,6 @@ class GroupRelay:
     def wake(self) -> None:
         """Be fed again."""
         self.sleeps, self.woke = False, time.time_ns()
-
-    def _resumed(self, message: Message, reason: DropReason | None) -> Sequence[Match | Drop]:
-        if reason is not None:
-            return (self.engine.reject(message, reason),)
-        return self.engine.add(message, now=self._now())
 
     def watched(self) -> Batch:
         """Give what came and left since this was last asked for, and all counts."""

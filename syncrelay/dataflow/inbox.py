@@ -101,7 +101,7 @@ class Backlog:
 
 
 class PolledInbox:
-    """Drains the sources that a watch names.
+    """An Inbox that drains the sources which a watch names.
 
     When a message comes, it waits `coalesce_ns` for others before it takes them all.
     """
@@ -116,12 +116,10 @@ class PolledInbox:
         self.wake = watch.wake
 
     def add(self, source: Source) -> None:
-        """Drain one more source."""
         self._watch.add(source)
         self._sources[source] = None
 
     def remove(self, source: Source) -> None:
-        """Deliver what is held of a source, and drain it no longer."""
         self._backlog.forget(source)
         if source in self._sources:
             del self._sources[source]
@@ -130,14 +128,12 @@ class PolledInbox:
             source.pending = 0
 
     def receive(self, longest_ns: int) -> None:
-        """Deliver what comes for so long, or until a wake or a failure."""
         end = time.monotonic_ns() + longest_ns
         rest = longest_ns
         while rest > 0 and not (self._turn(rest) or self.failed):
             rest = end - time.monotonic_ns()
 
     def receive_once(self, longest_ns: int) -> None:
-        """Wait for messages, for so long at most or until a wake, and deliver them."""
         self._turn(longest_ns)
 
     def _turn(self, longest_ns: int) -> bool:
@@ -152,13 +148,10 @@ class PolledInbox:
         return woken
 
     def deliver_all(self) -> None:
-        """Deliver what was received until now, however much it is."""
         self._backlog.deliver_until(time.time_ns(), self._sources)
 
     def deliver_held(self) -> None:
-        """Deliver what was taken and held, at the end: nothing more is taken."""
         self._backlog.deliver_held()
 
     def close(self) -> None:
-        """Free what the watch holds."""
         self._watch.close()

@@ -26,9 +26,6 @@ MOST_NOTED: Final = 10_000
 """How many manifests of all groups may wait to be published: those of ten seconds at 1000 sets a second."""
 
 
-_NONE_UNPUBLISHED: Final[dict[int, str]] = {}
-
-
 def _noted(flow: Flow, match: Match, latency: int) -> Note:
     """Note what the manifest of the set that was just sent tells. Its payloads are not kept: they may be large."""
     common, stamps = match.stamp, match.stamps
@@ -38,9 +35,8 @@ def _noted(flow: Flow, match: Match, latency: int) -> Note:
         left_as = tuple([common if restamped and stamp is not None else stamp for stamp, restamped in pairs])
     received = [None if message is None else message.payload.received for message in match.messages]
     sent = [0 if outlet is None else outlet.sent for outlet in flow.outlets]
-    unpublished = _NONE_UNPUBLISHED
-    if flow.unpublished:
-        unpublished = {index: each.why for index, each in flow.unpublished.items()}
+    unpublished = {index: each.why for index, each in flow.unpublished.items()}
+    if unpublished:
         sent = [0 if index in unpublished else count for index, count in enumerate(sent)]
     return Note(flow.n_sets, latency, common, stamps, left_as, received, sent, unpublished)
 
@@ -62,14 +58,9 @@ class GroupManifests:
 
     def tell(self, flow: Flow, match: Match, latency: int) -> None:
         """Have a manifest published of the set that a flow just sent, if anyone subscribes. On the receive thread."""
-        if self.is_heard:
-            self.note(_noted(flow, match, latency))
-
-    def note(self, note: Note) -> None:
-        """Have a manifest published, behind all that were noted before. On the receive thread."""
-        if len(self._noted) < MOST_NOTED:
-            self._noted.append((self, note))
-        else:
+        if self.is_heard and len(self._noted) < MOST_NOTED:
+            self._noted.append((self, _noted(flow, match, latency)))
+        elif self.is_heard:
             self._left_out += 1
 
     def publish(self, note: Note) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Hashable
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeAlias
 
 if TYPE_CHECKING:
     # A default is what spares those who have payloads of many types from writing Message[Any]. Python 3.13 has it.
@@ -17,12 +17,6 @@ else:
 
 # None of these changes once it is made, so they may be hashed. Frozen ones take three times as long to make,
 # NamedTuples nearly twice: with a message and a drop each, a fifth of what the engine needs.
-
-
-class _Why(NamedTuple):
-    reason: str
-    meaning: str
-    explanation: str
 
 
 class DropReason(Enum):
@@ -46,68 +40,46 @@ class DropReason(Enum):
         member.meaning, member.explanation = meaning, explanation
         return member
 
-    LATE = _Why(
-        "late",
-        "older than the last set",
-        "It is older than the last message of its input that went into a set.",
-    )
-    DUPLICATE = _Why(
-        "duplicate",
-        "its stamp came twice",
-        "A later message of the same stamp replaced it.",
-    )
-    OVERFLOW = _Why(
+    LATE = ("late", "older than the last set", "It is older than the last message of its input that went into a set.")
+    DUPLICATE = ("duplicate", "its stamp came twice", "A later message of the same stamp replaced it.")
+    OVERFLOW = (
         "overflow",
         "its queue was full",
-        "Its queue was full: `queue_size` is too short for the gap in rates, or no partner was left for it, as for most"
-        " of a fast topic beside a slow one: then no set is missed.",
+        (
+            "Its queue was full: `queue_size` is too short for the gap in rates, or no partner was left for it, as for"
+            " most of a fast topic beside a slow one: then no set is missed."
+        ),
     )
-    SUPERSEDED = _Why(
+    SUPERSEDED = (
         "superseded",
         "a newer set left",
         "A newer message of its input, one that fits better, went into a set.",
     )
-    TOO_FAR = _Why(
+    TOO_FAR = (
         "too_far",
         "no partner near enough",
-        "Nothing within slop (for a trigger: within `max_age`) could still come: mostly what a fast topic sends between"
-        " two messages of a slow one.",
+        (
+            "Nothing within slop (for a trigger: within `max_age`) could still come: mostly what a fast topic sends"
+            " between two messages of a slow one."
+        ),
     )
-    EXPIRED = _Why(
-        "expired",
-        "waited too long",
-        "It waited, or aged, longer than allowed.",
-    )
-    TIME_JUMP = _Why(
+    EXPIRED = ("expired", "waited too long", "It waited, or aged, longer than allowed.")
+    TIME_JUMP = (
         "time_jump",
         "timestamps jumped back",
         "Stamps of its group or the clock jumped back by more than a second: a recording began again.",
     )
-    UNSTAMPED = _Why(
-        "unstamped",
-        "its stamp is 0",
-        "Its stamp is zero: the driver does not fill it in.",
-    )
-    MALFORMED = _Why(
-        "malformed",
-        "no stamp could be read",
-        "No stamp could be read from its bytes.",
-    )
-    THINNED = _Why(
-        "thinned",
-        "its set was left out",
-        "Its set was left out by `max_rate` or `every`.",
-    )
-    PAUSED = _Why(
-        "paused",
-        "the relay was paused",
-        "It was waiting when the relay was paused, or came while it was.",
-    )
-    SHUTDOWN = _Why(
+    UNSTAMPED = ("unstamped", "its stamp is 0", "Its stamp is zero: the driver does not fill it in.")
+    MALFORMED = ("malformed", "no stamp could be read", "No stamp could be read from its bytes.")
+    THINNED = ("thinned", "its set was left out", "Its set was left out by `max_rate` or `every`.")
+    PAUSED = ("paused", "the relay was paused", "It was waiting when the relay was paused, or came while it was.")
+    SHUTDOWN = (
         "shutdown",
         "its group stopped",
-        "It was waiting when its group stopped: the relay ended or was deactivated, a reload changed the group, or"
-        " nobody listened to a lazy one any more.",
+        (
+            "It was waiting when its group stopped: the relay ended or was deactivated, a reload changed the group, or"
+            " nobody listened to a lazy one any more."
+        ),
     )
 
 

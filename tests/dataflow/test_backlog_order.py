@@ -1,35 +1,22 @@
 """The order in which the backlog hands on what its sources have."""
 
 import random
-from collections import deque
-from typing import Any
 
 import pytest
 
-from syncrelay.dataflow.backend import ALL
 from syncrelay.dataflow.inbox import Backlog
-from tests.dataflow.payloads import Named
+from tests.dataflow.payloads import Named, Source
 
 
-class _Source:
-    """Gives (time, payload) pairs, the first first."""
-
-    def __init__(self, delivered: list, *messages: tuple[int, Any]):
-        self.messages = deque(messages)
-        self.waited = 0
-        self.pending = ALL
-        self.deliver = lambda payload: delivered.append(payload.name)
-
-    def take(self):
-        if not self.messages:
-            return None
-        received, name = self.messages.popleft()
-        return Named(name, received)
+def _source(delivered: list, *messages: tuple[int, object]) -> Source:
+    """A source of payloads by their times of receipt, whose names are noted as they are delivered."""
+    named = (Named(name, received) for received, name in messages)
+    return Source(*named, deliver=lambda payload: delivered.append(payload.name))
 
 
 def test_messages_of_all_sources_leave_by_their_time_of_receipt():
     delivered: list[str] = []
-    sources = [_Source(delivered, (1, "a"), (4, "b")), _Source(delivered, (2, "A"), (3, "B"), (5, "C"))]
+    sources = [_source(delivered, (1, "a"), (4, "b")), _source(delivered, (2, "A"), (3, "B"), (5, "C"))]
     Backlog().deliver(sources, 10)
     assert delivered == ["a", "A", "B", "b", "C"]
 
@@ -37,11 +24,11 @@ def test_messages_of_all_sources_leave_by_their_time_of_receipt():
 def test_what_came_after_the_look_waits_for_the_next_one():
     delivered: list[str] = []
     backlog = Backlog()
-    slow, fast = _Source(delivered), _Source(delivered, (1, "a"), (6, "b"))
+    slow, fast = _source(delivered), _source(delivered, (1, "a"), (6, "b"))
     backlog.deliver([fast], 5)
     assert delivered == ["a"]
     assert backlog.held == {fast}
-    slow.messages.append((5, "A"))
+    slow.messages.append(Named("A", 5))
     backlog.deliver([slow], 10)
     assert delivered == ["a", "A", "b"]
     assert not backlog.held
@@ -50,7 +37,7 @@ def test_what_came_after_the_look_waits_for_the_next_one():
 def test_a_clock_that_is_set_back_holds_up_no_source():
     delivered: list[str] = []
     backlog = Backlog()
-    ahead, other = _Source(delivered, (1000, "a"), (1001, "b")), _Source(delivered, (1, "A"))
+    ahead, other = _source(delivered, (1000, "a"), (1001, "b")), _source(delivered, (1, "A"))
     backlog.deliver([ahead], 500)
     assert delivered == []
     for now in (1, 2):
@@ -61,7 +48,7 @@ def test_a_clock_that_is_set_back_holds_up_no_source():
 
 def test_what_is_told_of_a_source_that_ends_is_told_no_more():
     backlog = Backlog()
-    failing = _Source([], (6, "a"))
+    failing = _source([], (6, "a"))
     failing.deliver = {}.__getitem__
     backlog.deliver([failing], 5)
     backlog.forget(failing)
@@ -71,7 +58,7 @@ def test_what_is_told_of_a_source_that_ends_is_told_no_more():
 def test_a_flood_is_handed_on_in_batches_and_without_a_gap():
     delivered: list[str] = []
     backlog = Backlog()
-    flood = _Source(delivered, *((n, f"{n}") for n in range(1000)))
+    flood = _source(delivered, *((n, f"{n}") for n in range(1000)))
     backlog.deliver([flood], 1000)
     assert 0 < len(delivered) < 1000
     while backlog.held:
@@ -81,8 +68,8 @@ def test_a_flood_is_handed_on_in_batches_and_without_a_gap():
 
 def test_a_slow_topic_gets_its_turn_in_a_flood():
     delivered: list[str] = []
-    imu = _Source(delivered, *((2 * n, "imu") for n in range(10_000)))
-    camera = _Source(delivered, (99, "camera"))
+    imu = _source(delivered, *((2 * n, "imu") for n in range(10_000)))
+    camera = _source(delivered, (99, "camera"))
     Backlog().deliver([imu, camera], 20_000)
     assert delivered.index("camera") == 50
 
@@ -90,7 +77,7 @@ def test_a_slow_topic_gets_its_turn_in_a_flood():
 def test_a_source_that_ends_gives_what_is_held_of_it():
     delivered: list[str] = []
     backlog = Backlog()
-    ending, staying = _Source(delivered, (6, "a")), _Source(delivered, (7, "A"))
+    ending, staying = _source(delivered, (6, "a")), _source(delivered, (7, "A"))
     backlog.deliver([ending, staying], 5)
     backlog.forget(ending)
     assert delivered == ["a"]
@@ -101,7 +88,7 @@ def test_a_source_that_ends_gives_what_is_held_of_it():
 def test_messages_up_to_a_time_leave_however_many_they_are():
     delivered: list[str] = []
     backlog = Backlog()
-    source = _Source(delivered, *((n, f"{n}") for n in range(1000)))
+    source = _source(delivered, *((n, f"{n}") for n in range(1000)))
     backlog.deliver_until(900, [source])
     assert len(delivered) == 901
     backlog.deliver_held()
@@ -113,15 +100,15 @@ def test_messages_up_to_a_time_leave_however_many_they_are():
 def test_each_source_tells_how_long_its_own_messages_waited_whenever_it_was_looked_at(seed):
     chance = random.Random(seed)
     backlog = Backlog()
-    delivered: list[tuple[_Source, int]] = []
-    waits: dict[_Source, int] = {}
-    sources = [_Source(delivered) for _ in range(chance.randint(1, 4))]
+    delivered: list[tuple[Source, int]] = []
+    waits: dict[Source, int] = {}
+    sources = [_source(delivered) for _ in range(chance.randint(1, 4))]
     now = 0
     for _ in range(chance.randint(1, 30)):
         looked, now = now, now + chance.randint(1, 1000)
         for source in sources:
             came = sorted(chance.randint(looked, now + 5) for _ in range(chance.choice([0, 0, 1, 3])))
-            source.messages.extend((at, (source, at)) for at in came)
+            source.messages.extend(Named((source, at), at) for at in came)
         backlog.deliver([each for each in sources if each.messages or each in backlog.held], now)
         for source, at in delivered:
             waits[source] = max(waits.get(source, 0), now - at)

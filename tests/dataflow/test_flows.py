@@ -8,19 +8,16 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from syncrelay.cdr import read_stamp
-from syncrelay.config import load_text
 from syncrelay.dataflow.backend import PublishError
-from syncrelay.dataflow.group import GroupRelay
-from tests.dataflow.payloads import FLOWS, Named
+from tests.dataflow.payloads import FLOWS, Named, Outlet, group_of
 from tests.ros.cdr_messages import VECTOR, vector
-from tests.ros.configs import config, inputs
 from tests.ros.streams import BEGIN, MS
 
 pytestmark = pytest.mark.skipif(
     find_spec("syncrelay.ros.compiled.path") is None, reason="the compiled path was not built"
 )
 
-_TOPICS = {"/camera": VECTOR, "/lidar": VECTOR, "/imu": VECTOR}
+_TOPICS = ("/camera", "/lidar", "/imu")
 _KEYED = [{"topic": topic, "type": VECTOR, "key": "vector.x"} for topic in _TOPICS]
 _KINDS = [
     {"policy": "exact_time", "queue_size": 3},
@@ -34,37 +31,17 @@ _STREAMS = st.lists(
 )
 
 
-class _Outlet:
-    """Notes what it sends, and refuses some."""
-
-    topic = "/out"
-
-    def __init__(self, noted: list, place: int) -> None:
-        self._noted, self._place, self.refuses = noted, place, False
-
-    def send(self, payload) -> None:
-        if self.refuses:
-            raise PublishError("no room")
-        self._noted.append((self._place, payload.name))
-
-    def send_stamped(self, payload, stamp: int) -> None:
-        self.send(payload)
-        self._noted.append(stamp)
-
-
 def _played(flow, keys, stream, connected) -> list:
     """All that can be seen of a group of this flow."""
-    group = GroupRelay(
-        load_text(config({"front": {"topics": inputs(_TOPICS), **keys}})).groups[0], now=lambda: seen[0], flow=flow
-    )
     seen = [0]
+    group = group_of(**{"topics": _TOPICS, **keys}, now=lambda: seen[0], flow=flow)
     noted: list[object] = []
-    outlets = [_Outlet(noted, index) for index in range(3)]
+    outlets = [Outlet(log=noted, place=index) for index in range(3)]
     for index in connected:
         group.connect(index, outlets[index], restamped=index != 1)
     group.flow.tell = lambda flow, match, _: noted.append(("told", flow.n_sets, match.stamps, match.stamp))
     for count, (index, ahead, refuses) in enumerate(stream):
-        seen[0], outlets[index].refuses = count * MS, refuses
+        seen[0], outlets[index].refusal = count * MS, PublishError("no room") if refuses else None
         stamp = None if ahead is None else BEGIN + (10 * count + ahead) * MS
         group.flow.receive(
             index, Named(count, BEGIN + count), stamp, count // 4 if keys["policy"] == "equal_key" else None

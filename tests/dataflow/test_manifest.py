@@ -3,11 +3,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncrelay.config import load_text
-from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.manifest import ManifestWriter
-from tests.ros.cdr_messages import NS_PER_SECOND, STORE, VECTOR
-from tests.ros.configs import config, inputs
+from tests.dataflow.payloads import group_of
+from tests.ros.cdr_messages import NS_PER_SECOND, STORE
 from tests.ros.manifests import ERROR, MANIFEST_TYPE, OK, STALE, WARN, Member, Told, ToldInput, note, read
 
 _NAMES = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,40}", fullmatch=True)
@@ -18,11 +16,6 @@ _WHY = st.one_of(st.just(""), st.text(st.characters(exclude_categories=["Cs"], e
 _MEMBERS = st.builds(Member, _STAMPS, _STAMPS, _TIMES, _COUNTS, _WHY)
 
 
-def _group(name: str, topics: list[str], **keys) -> GroupRelay:
-    group = {"policy": "exact_time", "topics": inputs(dict.fromkeys(topics, VECTOR)), **keys}
-    return GroupRelay(load_text(config({name: group})).groups[0], now=lambda: 0)
-
-
 @given(data=st.data(), name=_NAMES, node=_NAMES, number=_COUNTS, latency=_TIMES)
 def test_others_read_what_was_written(data, name, node, number, latency):
     tokens = data.draw(st.lists(_NAMES, min_size=2, max_size=5, unique=True))
@@ -31,7 +24,9 @@ def test_others_read_what_was_written(data, name, node, number, latency):
         members[0] = data.draw(_MEMBERS)
     common = data.draw(st.one_of(st.none(), _STAMPS))
     topics = [(f"/{each}", f"/out/{each}") for each in tokens]
-    writer = ManifestWriter(_group(name, [each for each, _ in topics]).config, node=f"/{node}", topics=topics)
+    writer = ManifestWriter(
+        group_of(name=name, topics=[each for each, _ in topics]).config, node=f"/{node}", topics=topics
+    )
     payload = writer.write(note(number, members, common=common, latency=latency))
 
     told = read(payload)
@@ -66,7 +61,7 @@ def test_others_read_what_was_written(data, name, node, number, latency):
 
 
 def test_a_long_reason_is_told_in_part():
-    group = _group("front", ["/a", "/b"])
+    group = group_of(topics=["/a", "/b"])
     writer = ManifestWriter(group.config, node="/n", topics=[("/a", "/x"), ("/b", "/y")])
     members = [Member(1, 1, 1, 0, "no room\0, " * 100), Member(1, 1, 1, 1)]
     assert 0 < len(read(writer.write(note(1, members))).inputs[0].message) <= 200

@@ -1,73 +1,34 @@
 """Manifests on their way out: each set's is published once, in order, whoever publishes, and before its outlet ends."""
 
-import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 import pytest
 
-from syncrelay.config import load_text
 from syncrelay.dataflow import manifest_queue
 from syncrelay.dataflow.backend import PublishError
 from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.manifest import ManifestWriter
 from syncrelay.dataflow.manifest_queue import GroupManifests, ManifestQueue
-from tests.dataflow.payloads import Named
-from tests.ros.cdr_messages import VECTOR
-from tests.ros.configs import config, inputs
+from tests.dataflow.payloads import Named, Outlet, connect, group_of
 from tests.ros.manifests import ERROR, OK, read
 from tests.ros.processes import wait_until
 from tests.ros.streams import BEGIN, MS
-
-
-class _Outlet:
-    """Publishes, refuses or is not heard, as it is told, until it ends."""
-
-    topic = "/out"
-
-    def __init__(self) -> None:
-        self.sent = 0
-        self.contents: list[bytes] = []
-        self.heard = True
-        self.refusal: Exception | None = None
-        self.ended = False
-        self.used_after_its_end = False
-
-    def send(self, _payload: object) -> None:
-        if self.refusal is not None:
-            raise self.refusal
-        self.sent += 1
-
-    def send_stamped(self, payload: object, _stamp: int) -> None:
-        self.send(payload)
-
-    def send_content(self, content: bytes) -> None:
-        # As publishing does, it lets other threads run.
-        time.sleep(0)
-        self.used_after_its_end |= self.ended
-        self.send(content)
-        self.contents.append(content)
-
-    def is_heard(self) -> bool:
-        self.used_after_its_end |= self.ended
-        return self.heard
 
 
 class _Told:
     """A group of two inputs whose sets are told."""
 
     def __init__(self, queue: ManifestQueue, name: str = "front") -> None:
-        text = config({name: {"policy": "exact_time", "topics": inputs({"/a": VECTOR, "/b": VECTOR})}})
-        self.group = GroupRelay(load_text(text).groups[0], now=lambda: 0)
-        self.outlets, self.manifest = (_Outlet(), _Outlet()), _Outlet()
+        self.group = group_of(name=name, topics=["/a", "/b"])
+        self.outlets, self.manifest = (Outlet(), Outlet()), Outlet()
         topics = [("/a", f"/{name}/a"), ("/b", f"/{name}/b")]
         writer = ManifestWriter(self.group.config, node="/syncrelay", topics=topics)
         self.manifests: GroupManifests = queue.begin(name, writer, self.manifest)
         self.group.tell_sets(self.manifests)
-        for index, outlet in enumerate(self.outlets):
-            self.group.connect(index, outlet, restamped=False)
+        connect(self.group, self.outlets)
         self._stamp = BEGIN
 
     def feed_sets(self, count: int = 1) -> None:
@@ -79,7 +40,7 @@ class _Told:
     @property
     def numbers(self) -> list[int]:
         """The numbers of the sets that were told."""
-        return [read(content).number for content in self.manifest.contents]
+        return [read(content).number for content in self.manifest.log]
 
 
 @pytest.fixture
@@ -104,7 +65,7 @@ def test_what_could_not_be_published_is_told_as_it_was_when_the_set_left(queue):
         told.outlets[1].refusal = refusal
         told.feed_sets()
     queue.publish()
-    first, refused, last = map(read, told.manifest.contents)
+    first, refused, last = map(read, told.manifest.log)
     assert (first.level, first.message, last.level, last.message) == (OK, "complete", OK, "complete")
     assert (refused.level, refused.message) == (ERROR, "1 of 2 not published")
     assert (refused.inputs[1].level, refused.inputs[1].message, refused.inputs[1].sequence) == (ERROR, "no room", 0)
@@ -185,7 +146,7 @@ def test_a_group_that_takes_the_place_of_another_is_told_behind_it(queue):
     writer = ManifestWriter(after.config, node="/syncrelay", topics=[("/a", "/x"), ("/b", "/y")])
     after.tell_sets(queue.begin("front", writer, before.manifest))
     for index in range(2):
-        after.connect(index, _Outlet(), restamped=False)
+        after.connect(index, Outlet(), restamped=False)
         after.flow.receive(index, Named(b"", BEGIN), BEGIN)
     queue.keep(())
     assert before.numbers == [1, 2, 1]
@@ -194,7 +155,7 @@ def test_a_group_that_takes_the_place_of_another_is_told_behind_it(queue):
 def test_what_an_output_gave_is_told_before_it_numbers_anew(queue):
     told = _Told(queue)
     told.feed_sets(2)
-    told.group.connect(0, _Outlet(), restamped=False)
+    told.group.connect(0, Outlet(), restamped=False)
     assert told.numbers == [1, 2]
 
 

@@ -3,16 +3,13 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncrelay.config import load_text
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.sync import DropReason
-from tests.dataflow.payloads import Named, Outlet, connect
+from tests.dataflow.payloads import PAIR, Named, Outlet, connect, group_of
 from tests.ros.cdr_messages import VECTOR
-from tests.ros.configs import config, inputs
 from tests.ros.streams import BEGIN, MS
 
-_PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
-_WITH_RADAR = [*inputs(_PAIR), {"topic": "/radar", "type": VECTOR, "required": False}]
+_WITH_RADAR = [*PAIR, {"topic": "/radar", "type": VECTOR, "required": False}]
 _KINDS = {
     "exact_time": {},
     "approximate_time": {"slop": "30ms"},
@@ -23,8 +20,7 @@ _KINDS = {
 
 
 def _group(*, now=lambda: 0, **keys) -> tuple[GroupRelay, list[Outlet]]:
-    text = config({"front": {"policy": "exact_time", "topics": inputs(_PAIR), **keys}})
-    group = GroupRelay(load_text(text).groups[0], now=now)
+    group = group_of(now=now, **keys)
     outlets = [Outlet() for _ in group.config.topics]
     connect(group, outlets)
     return group, outlets
@@ -36,7 +32,7 @@ def _give(group: GroupRelay, index: int, ms: int) -> None:
 
 
 def _sent(outlets: list[Outlet]) -> list[list[int]]:
-    return [[(stamp - BEGIN) // MS for stamp in outlet.sent] for outlet in outlets]
+    return [[(stamp - BEGIN) // MS for stamp in outlet.log] for outlet in outlets]
 
 
 def test_what_waits_and_what_comes_is_dropped_as_paused_and_what_comes_after_is_matched():
