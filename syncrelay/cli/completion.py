@@ -33,7 +33,8 @@ _MOST_BYTES: Final = 1_000_000
 # Words that may stand before the program's name, as zsh passes the whole line.
 _BEFORE: Final = re.compile(r".*[;&|({]|\w+=.*|sudo|env|exec|nice|nohup|time|!")
 
-_Completer = Callable[[str, Namespace], Iterable[str] | Mapping[str, str]]
+# As argcomplete calls it: with `prefix`, which is typed already, `parsed_args`, and more that none of these needs.
+_Completer = Callable[..., Iterable[str] | Mapping[str, str]]
 
 
 def parser() -> Parser:
@@ -76,15 +77,12 @@ def complete() -> int:
     ExclusiveCompletionFinder()(
         parser,
         # Where a file is expected, options are offered only after a dash.
-        exit_method=_return,
+        # argcomplete would exit; the process ends as after any command.
+        exit_method=lambda _code: None,
         always_complete_options=False if has_positionals and words else "long",
         validator=lambda completion, typed: completion.startswith(typed) and printable(completion) == completion,
     )
     return DONE
-
-
-def _return(_code: int) -> None:
-    """Return, where argcomplete would exit: the process ends as after any command."""
 
 
 def _is_start(words: Sequence[str], place: int) -> bool:
@@ -103,28 +101,19 @@ def _relay_parser(words: Sequence[str]) -> Parser:
 def _set_completers(parser: Parser) -> None:
     for action in parser.actions:
         if action.choices is None:
-            action.completer = _called(COMPLETERS.get(str(action.metavar), _nothing))  # type: ignore[attr-defined]
+            action.completer = COMPLETERS.get(str(action.metavar), _nothing)  # type: ignore[attr-defined]
 
 
-def _called(completer: _Completer) -> Callable[..., Iterable[str] | Mapping[str, str]]:
-    """Return a completer as argcomplete calls it."""
-
-    def call(*, prefix: str, parsed_args: Namespace, **_others: Any) -> Iterable[str] | Mapping[str, str]:
-        return completer(prefix, parsed_args)
-
-    return call
-
-
-def _nothing(_typed: str, _arguments: Namespace) -> Iterable[str]:
+def _nothing(**_: Any) -> Iterable[str]:
     return ()
 
 
-def _image_formats(typed: str, _arguments: Namespace) -> Iterable[str]:
-    topic = "".join(typed.rpartition("=")[:2])
+def _image_formats(*, prefix: str, **_: Any) -> Iterable[str]:
+    topic = "".join(prefix.rpartition("=")[:2])
     return [f"{topic}{each}" for each in IMAGE_FORMATS]
 
 
-def _commands(_typed: str, _arguments: Namespace) -> Mapping[str, str]:
+def _commands(**_: Any) -> Mapping[str, str]:
     return {name: command.does for name, command in COMMANDS.items()}
 
 
@@ -132,8 +121,8 @@ def _files(pattern: str) -> _Completer:
     """Return what completes the names of files that match, and of folders on the way to them."""
     wanted = re.compile(pattern)
 
-    def complete_file(typed: str, _arguments: Namespace) -> Iterator[str]:
-        folder, slash, begun = typed.rpartition("/")
+    def complete_file(*, prefix: str, **_: Any) -> Iterator[str]:
+        folder, slash, begun = prefix.rpartition("/")
         with suppress(OSError):
             for entry in sorted(Path(folder + slash or ".").expanduser().iterdir()):
                 if entry.name.startswith(".") and not begun.startswith("."):
@@ -146,9 +135,9 @@ def _files(pattern: str) -> _Completer:
     return complete_file
 
 
-def _groups(_typed: str, arguments: Namespace) -> Iterator[str]:
+def _groups(*, parsed_args: Namespace, **_: Any) -> Iterator[str]:
     """Give the groups of the files that --config names; none of a file that is not valid YAML."""
-    for name in arguments.config or ():
+    for name in parsed_args.config or ():
         with suppress(OSError):
             for path in map(Path, yaml_files(str(Path(name).expanduser()))):
                 # Reading a pipe would wait for it, and empty it.
@@ -157,18 +146,18 @@ def _groups(_typed: str, arguments: Namespace) -> Iterator[str]:
                         yield from group_names(file.read(_MOST_BYTES))
 
 
-def _recordings_and_topics(typed: str, arguments: Namespace) -> Iterator[str]:
+def _recordings_and_topics(*, prefix: str, parsed_args: Namespace, **_: Any) -> Iterator[str]:
     """Give the topics of the recording that is named first; where none begins so, more recordings."""
     from syncrelay.errors import BagError
     from syncrelay.recordings.bag import is_url, open_recording
 
     topics = set[str]()
     # Nobody pays for a press of the Tab key, or waits for a server.
-    if not is_url(arguments.bag):
-        with suppress(BagError), closing(open_recording([arguments.bag])) as recording:
-            topics = {channel.topic for channel in recording.channels} - set(arguments.more)
-    begun = sorted(topic for topic in topics if topic.startswith(typed))
-    yield from begun or _files(_RECORDING)(typed, arguments)
+    if not is_url(parsed_args.bag):
+        with suppress(BagError), closing(open_recording([parsed_args.bag])) as recording:
+            topics = {channel.topic for channel in recording.channels} - set(parsed_args.more)
+    begun = sorted(topic for topic in topics if topic.startswith(prefix))
+    yield from begun or _files(_RECORDING)(prefix=prefix)
 
 
 _YAML: Final = r".*\.ya?ml"

@@ -75,7 +75,14 @@ def examine(
         if started is not None and started.failed is None:
             observed = _observe(config, ros_args, started.node, seconds=live_s)
         if started is None or observed is None:
-            found.append(_not_looked())
+            found.append(
+                info(
+                    "not_looked",
+                    "--live did not look at the graph, because the relay cannot start here",
+                    impact="problems in the graph are not shown",
+                    fix="fix the errors above first",
+                )
+            )
         else:
             found += _of_graph(observed, config, started, environ)
     return Examination(
@@ -133,15 +140,6 @@ def _of_file(config: Config | None, started: StartResult) -> Iterator[Diagnosis]
         yield from check_types(config, started.unusable)
         if started.names:
             yield from check_remaps(config, started.names)
-
-
-def _not_looked() -> Diagnosis:
-    return info(
-        "not_looked",
-        "--live did not look at the graph, because the relay cannot start here",
-        impact="problems in the graph are not shown",
-        fix="fix the errors above first",
-    )
 
 
 def _observe(config: Config | None, ros_args: Sequence[str], node: str, *, seconds: float) -> Observed | None:

@@ -63,7 +63,15 @@ def check_installation(found: Installation) -> Iterator[Diagnosis]:
         return
     if found.built_for and found.python not in found.built_for:
         yield _other_python(found)
-    yield from _two_sets(found)
+    if found.wheels and found.sourced:
+        places = all_of(str(prefix) for prefix in found.sourced)
+        yield error(
+            "two_ros",
+            f"ROS 2 is sourced ({places}), and its wheels are installed in this Python too",
+            impact="two sets of the same libraries meet in one process: it crashes, or types are not found",
+            fix="start from a shell without ROS sourced, or use a venv without the wheels:\n"
+            "python3 -m venv --system-site-packages, then pip install . in a clone of syncrelay",
+        )
     yield from _middleware(found)
 
 
@@ -106,18 +114,6 @@ def _other_python(found: Installation) -> Diagnosis:
         impact="import rclpy fails: its compiled part does not load",
         fix=f"start syncrelay with Python {versions}, or install rclpy for this one",
     )
-
-
-def _two_sets(found: Installation) -> Iterator[Diagnosis]:
-    if found.wheels and found.sourced:
-        places = all_of(str(prefix) for prefix in found.sourced)
-        yield error(
-            "two_ros",
-            f"ROS 2 is sourced ({places}), and its wheels are installed in this Python too",
-            impact="two sets of the same libraries meet in one process: it crashes, or types are not found",
-            fix="start from a shell without ROS sourced, or use a venv without the wheels:\n"
-            "python3 -m venv --system-site-packages, then pip install . in a clone of syncrelay",
-        )
 
 
 def _middleware(found: Installation) -> Iterator[Diagnosis]:
