@@ -111,21 +111,6 @@ _ONE = {"swap": [("/x", _IMU, "/a"), ("/y", _FIELD, "/b")]}
 _OTHER = {"swap": [("/x", _IMU, "/b"), ("/y", _FIELD, "/a")]}
 
 
-def test_what_cannot_be_made_after_the_old_ended_leaves_all_as_it_was(here):
-    here.bindings.run(_groups(**_ONE, rear=[("/x", _IMU, "/c"), ("/z", _IMU, "/d")]))
-    _poll(here)
-    before, groups = _published(here), here.bindings.groups
-    answers = iter([False, False, False, True, False, False])
-    here.entities.refuses = lambda: next(answers)
-    with pytest.raises(ReloadError, match="the relay cannot publish /a as any: no more memory"):
-        here.bindings.run([groups[1], *_groups(**_OTHER)])
-    assert _published(here) == before
-    assert here.bindings.groups == groups
-    here.entities.refuses = lambda: False
-    here.bindings.run([groups[1], *_groups(**_OTHER)])
-    assert _published(here) == {"/b": "Imu", "/a": "MagneticField", "/c": "Imu", "/d": "Imu"}
-
-
 def test_what_could_be_made_neither_anew_nor_again_is_told_and_made_at_a_later_poll(here):
     here.bindings.run(_groups(**_ONE))
     _poll(here)

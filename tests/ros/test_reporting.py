@@ -1,7 +1,6 @@
 """Where findings are seen: /diagnostics, topics for plotting, `observe`, HTTP."""
 
 import signal
-import socket
 import struct
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from tests.ros.configs import config, inputs
 from tests.ros.processes import wait_until
 from tests.ros.sensors import PAIR, assert_looked_at_a_healthy_rig, front, play, stream
 from tests.ros.stage import Collector, Stage
-from tests.ros.status import findings, get
+from tests.ros.status import get
 from tests.ros.streams import merged
 from tests.test_foxglove import detailed, plotted
 
@@ -143,29 +142,3 @@ def test_observe_exits_with_1_and_what_to_do(stage: Stage):
     ) in told
     assert "would have left: 0 sets hint: no values to suggest: no messages of /camera, /lidar" in told
     assert told.endswith("exit code 1: front has 1 error")
-
-
-def test_a_port_that_is_taken_is_an_error_that_says_so(stage: Stage):
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        address = "{}:{}".format(*taken.getsockname())
-        relay = stage.relay(front(top={"metrics": {"listen": address}}))
-        assert relay.wait() == 1
-    assert relay.said[-1] == (
-        f"syncrelay: cannot listen on {address}: another process uses it; set another `listen` in `metrics`, or write"
-        " `metrics: null` to run without"
-    )
-
-
-def test_clients_that_stall_keep_no_message_and_no_answer_back(stage: Stage):
-    relay = stage.relay(front())
-    play(stage, _RIG)
-    wait_until(lambda: bool(findings(relay)), "a first look")
-    host, port = relay.stderr.split("http://")[1].split("/")[0].split(":")
-    stalled = [socket.create_connection((host, int(port))) for _ in range(10)]
-    for client in stalled:
-        client.sendall(b"GET /status HTTP/1.1\r\nHost:")
-    try:
-        wait_until(lambda: "healthy" in findings(relay), "an answer beside the clients that stall")
-    finally:
-        for client in stalled:
-            client.close()
