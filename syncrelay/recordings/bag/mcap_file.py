@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Iterator
 from functools import partial
-from typing import Final
 
 from mcap.opcode import Opcode
 from mcap.records import Channel as ChannelRecord
@@ -14,11 +13,9 @@ from syncrelay.recordings.bag.mcap_index import McapIndex, chunk_at
 from syncrelay.recordings.bag.mcap_parts import Parts, is_mixed, is_needed
 from syncrelay.recordings.bag.mcap_records import RECORD, UNREADABLE, add_messages, unpacked
 from syncrelay.recordings.bag.qos import read_profiles
-from syncrelay.recordings.bag.recording import Channel, Definition, Encoding, RawMessage
+from syncrelay.recordings.bag.recording import Channel, Definition, RawMessage
 from syncrelay.recordings.bag.segments import Segment, extent, read_in_order
 from syncrelay.recordings.bag.sources import Source
-
-_ENCODINGS: Final[dict[str, Encoding | str]] = {each.value: each for each in Encoding}
 
 
 class McapFile:
@@ -77,7 +74,7 @@ class McapFile:
             record.id,
             record.topic,
             schema.name if schema else "",
-            _ENCODINGS.get(record.message_encoding, record.message_encoding),
+            record.message_encoding,
             Definition(schema.encoding, schema.data.decode(errors="replace")) if schema and schema.data else None,
             read_profiles(record.metadata.get("offered_qos_profiles", "")),
             record.metadata.get("topic_type_hash", ""),

@@ -22,6 +22,9 @@ class Encoding(Enum):
     ROS1 = "ros1"
 
 
+_ENCODINGS: Final = {each.value: each for each in Encoding}
+
+
 @dataclass(frozen=True, slots=True)
 class Definition:
     """A type's definition as recorded, with those of the types that it is made of.
@@ -55,7 +58,7 @@ class Channel:
         object.__setattr__(self, "topic", printable(topic_name(self.topic)))
         object.__setattr__(self, "type", printable(_full_type_name(self.type)))
         if not isinstance(self.encoding, Encoding):
-            object.__setattr__(self, "encoding", printable(self.encoding))
+            object.__setattr__(self, "encoding", _ENCODINGS.get(self.encoding) or printable(self.encoding))
 
 
 def topic_name(recorded: str) -> str:

@@ -18,7 +18,7 @@ from syncrelay.errors import BagError
 from syncrelay.recordings.bag.effort import Effort
 from syncrelay.recordings.bag.losses import OF_NO_CHANNEL, OF_NO_TIME, Losses
 from syncrelay.recordings.bag.qos import read_profiles
-from syncrelay.recordings.bag.recording import LATEST, Channel, Definition, Encoding, RawMessage, batched
+from syncrelay.recordings.bag.recording import LATEST, Channel, Definition, RawMessage, batched
 from syncrelay.recordings.bag.unpacking import unzstd
 
 MAGIC: Final = b"SQLite format 3\0"
@@ -37,7 +37,6 @@ _TABLES: Final = ("topics", "messages", "message_definitions")
 _KIND: Final = "SELECT DISTINCT type FROM pragma_table_list WHERE name = ? COLLATE NOCASE AND schema = 'main'"
 # The column of table_xinfo that is not 0 for generated columns.
 _HIDDEN: Final = 6
-_ENCODINGS: Final[dict[str, Encoding | str]] = {each.value: each for each in Encoding}
 # ValueError: an error text of sqlite3 that quotes a damaged name is no valid UTF-8.
 _UNREADABLE: Final = (sqlite3.Error, ValueError, MemoryError)
 _NOT_UNPACKED: Final = (ZstdError, ValueError, EOFError, MemoryError)
@@ -128,7 +127,7 @@ class SqliteFile:
                 number,
                 topic,
                 type_name,
-                _ENCODINGS.get(encoding, encoding),
+                encoding,
                 definitions.get(type_name),
                 read_profiles(profiles) if isinstance(profiles, str) else (),
                 hashed if isinstance(hashed, str) else "",

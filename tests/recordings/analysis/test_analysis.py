@@ -17,12 +17,30 @@ from syncrelay.recordings.analysis.streams import Stream
 from syncrelay.recordings.analysis.topics import figures_of
 from syncrelay.recordings.analysis.watching import judged_seconds, watch_group
 from syncrelay.sync import DropReason
-from tests.recordings.analysis.made_streams import every, streams_of
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.streams import BEGIN, MS
 
 _SECOND = 1000 * MS
+
+
+def streams_of(*topics, latency=5 * MS, late=0):
+    """Streams of stamps in nanoseconds, received `latency` later, and those of the first topic later by `late`."""
+    came = sorted(
+        (stamp + latency + (0 if index else late), index, stamp)
+        for index, stamps in enumerate(topics)
+        for stamp in stamps
+    )
+    streams = [Stream(f"/{'abcdef'[index]}", VECTOR) for index in range(len(topics))]
+    for place, (received, index, stamp) in enumerate(came):
+        for values, value in (("stamps", stamp), ("received", received), ("places", place)):
+            getattr(streams[index], values).append(value)
+    return streams
+
+
+def every(period, count, *, phase=0, jitter=0, seed=1):
+    chance = random.Random(seed)
+    return [BEGIN + phase + n * period + round(chance.uniform(-jitter, jitter)) for n in range(count)]
 
 
 def test_the_rhythm_of_a_topic_is_measured():
