@@ -5,13 +5,14 @@ from functools import partial
 
 from mcap.opcode import Opcode
 from mcap.records import Channel as ChannelRecord
+from mcap.records import Chunk
 
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag.effort import Effort
 from syncrelay.recordings.bag.losses import Losses
-from syncrelay.recordings.bag.mcap_index import McapIndex, chunk_at
+from syncrelay.recordings.bag.mcap_index import McapIndex
 from syncrelay.recordings.bag.mcap_parts import Parts, is_mixed, is_needed
-from syncrelay.recordings.bag.mcap_records import RECORD, UNREADABLE, add_messages, unpacked
+from syncrelay.recordings.bag.mcap_records import RECORD, UNREADABLE, add_messages, parsed, unpacked
 from syncrelay.recordings.bag.qos import read_profiles
 from syncrelay.recordings.bag.recording import Channel, Definition, RawMessage
 from syncrelay.recordings.bag.segments import Segment, extent, read_in_order
@@ -97,7 +98,7 @@ class McapFile:
         opcode, length = RECORD.unpack(self._bytes(segment.offset, RECORD.size))
         if opcode != Opcode.CHUNK or length != segment.size - RECORD.size:
             raise ValueError("it does not match the index")
-        return unpacked(chunk_at(self._file, segment), self._effort)
+        return unpacked(parsed(Chunk, self._file.read(length)), self._effort)
 
     def _bytes(self, place: int, size: int) -> bytes:
         """Read bytes that are known to be in the file."""

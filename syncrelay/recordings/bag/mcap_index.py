@@ -22,7 +22,6 @@ from syncrelay.recordings.bag.mcap_records import (
     RECORD,
     UNREADABLE,
     parsed,
-    parsed_from,
     records,
     require_record,
     unpacked,
@@ -183,7 +182,7 @@ class McapIndex:
             self._losses.damaged(f"the {Opcode(opcode).name.lower()} at byte {place}", fault)
 
     def _note_chunk(self, record: Segment) -> None:
-        chunk = chunk_at(self._file, record)
+        chunk = parsed(Chunk, self._bytes(record.offset + RECORD.size, record.size - RECORD.size))
         content = unpacked(chunk, self._effort)
         segment = Segment(record.offset, record.size, chunk.message_start_time, chunk.message_end_time)
         self.segments.append(segment)
@@ -216,10 +215,3 @@ class McapIndex:
         """Read bytes that are known to be in the file."""
         self._file.seek(place)
         return self._file.read(size)
-
-
-def chunk_at(file: Source, record: Segment) -> Chunk:
-    """Return the chunk of a record; raises one of UNREADABLE."""
-    file.seek(record.offset + RECORD.size)
-    chunk: Chunk = parsed_from(Chunk, file, record.size - RECORD.size)
-    return chunk

@@ -4,7 +4,7 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping
 from io import BytesIO
 from struct import Struct, error
-from typing import Any, Final, Protocol, TypeVar
+from typing import Final, Protocol, TypeVar
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -41,35 +41,18 @@ class Kind(Protocol[_Parsed_co]):
     def read(stream: ReadDataStream) -> _Parsed_co: ...
 
 
-class Readable(Protocol):
-    """Anything with `read`, such as a file."""
+class _Content(BytesIO):
+    """The content of a record; reading past its end, which mcap does not notice, raises EOFError."""
 
-    def read(self, size: int, /) -> bytes: ...
-
-
-class _Bounded:
-    """The next `size` bytes of a stream; reading past them raises EOFError."""
-
-    def __init__(self, stream: Readable, size: int) -> None:
-        self._stream = stream
-        self._left = size
-
-    def read(self, size: int) -> bytes:
-        if size > self._left:
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is not None and size > len(self.getbuffer()) - self.tell():
             raise EOFError("a length in it points past its end")
-        self._left -= size
-        return self._stream.read(size)
+        return super().read(size)
 
 
 def parsed(kind: Kind[_Parsed_co], content: bytes) -> _Parsed_co:
     """Return a record of a kind, parsed from what follows its length; raises one of UNREADABLE."""
-    return parsed_from(kind, BytesIO(content), len(content))
-
-
-def parsed_from(kind: Kind[_Parsed_co], stream: Readable, size: int) -> _Parsed_co:
-    """Return a record as `parsed` does, from the next `size` bytes of a stream, without copying them twice."""
-    bounded: Any = _Bounded(stream, size)
-    return kind.read(ReadDataStream(bounded))
+    return kind.read(ReadDataStream(_Content(content)))
 
 
 def require_record(opcode: int) -> None:
