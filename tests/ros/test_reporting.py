@@ -6,16 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from prometheus_client.parser import text_string_to_metric_families
 from rosbags.typesys import Stores, get_typestore
 
-from tests.dashboard import EXPRESSIONS, series
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.processes import wait_until
 from tests.ros.sensors import PAIR, assert_looked_at_a_healthy_rig, front, play, stream
 from tests.ros.stage import Collector, Stage
-from tests.ros.status import get
 from tests.ros.streams import merged
 from tests.test_foxglove import detailed, plotted
 
@@ -92,11 +89,11 @@ def test_diagnostics_have_a_status_for_each_group(stage: Stage):
     assert rear[2]["finding"] == "over_slop"
 
 
-def test_what_the_foxglove_layout_and_the_grafana_dashboard_draw_is_there_on_a_running_relay(stage: Stage):
+def test_what_the_foxglove_layout_draws_is_there_on_a_running_relay(stage: Stage):
     topics = dict.fromkeys(plotted(), FLOAT)
     assert set(topics) == {f"/syncrelay/front/{figure}" for figure in ("sets_hz", "span_ms", "latency_ms")}
     collector = stage.collector({**topics, "/diagnostics": DIAGNOSTICS})
-    relay = stage.relay(front(top={"diagnostics": {"scalars": True}}))
+    stage.relay(front(top={"diagnostics": {"scalars": True}}))
     play(stage, _RIG)
 
     def last_span() -> float:
@@ -109,9 +106,6 @@ def test_what_the_foxglove_layout_and_the_grafana_dashboard_draw_is_there_on_a_r
     (told,) = collector.wait_for("/diagnostics", 1)[-1:]
     array: Any = _STORE.deserialize_cdr(told, DIAGNOSTICS)
     assert {detailed()} == {(each.hardware_id, each.name) for each in array.status}
-    families = [family.name for family in text_string_to_metric_families(get(relay, "/metrics"))]
-    there = {name + ending for name in families for ending in ("", "_total", "_bucket")}
-    assert {name for expression in EXPRESSIONS for name, _ in series(expression)} - there == set()
 
 
 def test_without_diagnostics_and_metrics_nothing_is_published_and_nothing_listens(stage: Stage):

@@ -2,24 +2,42 @@
 
 import json
 import re
+from collections.abc import Iterator
 from itertools import combinations
+from pathlib import Path
+from typing import Any, Final
 
 import pytest
 from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
 from syncrelay.status.metrics import registry
-from tests.dashboard import DASHBOARD, EXPRESSIONS, MATCHERS, TARGETS, series
 from tests.status.support.states import relay, working
 
-_PANELS = DASHBOARD["panels"]
-_VARIABLES = {each["name"]: each for each in DASHBOARD["templating"]["list"]}
+_DASHBOARD: Final[dict[str, Any]] = json.loads((Path(__file__).parents[2] / "configs" / "grafana.json").read_text())
+_TARGETS: Final = [(panel, target) for panel in _DASHBOARD["panels"] for target in panel["targets"]]
+_EXPRESSIONS: Final = [
+    *(target["expr"] for _, target in _TARGETS),
+    *(each["expr"] for each in _DASHBOARD["annotations"]["list"]),
+]
+_MATCHERS: Final = re.compile(r"(\w+)\{([^}]*)\}")
+_MATCHER = re.compile(r"(\w+)(?:=|!=|=~|!~)\"[^\"]*\"")
+_PANELS = _DASHBOARD["panels"]
+_VARIABLES = {each["name"]: each for each in _DASHBOARD["templating"]["list"]}
 _DATASOURCE = {"type": "prometheus", "uid": "${datasource}"}
 # Labels that Prometheus adds to each series, and variables that Grafana defines.
 _OF_A_SCRAPE = {"job", "instance"}
 _BUILT_IN = {"__rate_interval", "__interval"}
 _FUNCTIONS = {"changes", "count", "histogram_quantile", "max", "rate", "sum", "time", "vector"}
 _GROUPING = re.compile(r"\b(?:by|without|on|ignoring) ?\(([^)]*)\)")
+
+
+def _series(expression: str) -> Iterator[tuple[str, set[str]]]:
+    """The name of each series in a query, with the labels that select it."""
+    for name, matchers in _MATCHERS.findall(expression):
+        labels = [_MATCHER.fullmatch(each) for each in matchers.split(",")]
+        yield name, {each[1] for each in labels if each is not None}
+        assert all(labels), matchers
 
 
 def _exported():
@@ -35,12 +53,12 @@ _EXPORTED = _exported()
 def _left(expression):
     """The labels of the result of a query."""
     grouped = [set(re.split(r", ?", labels)) for labels in _GROUPING.findall(expression)]
-    return grouped[0] if grouped else set.intersection(*(_EXPORTED[name] for name, _ in series(expression)))
+    return grouped[0] if grouped else set.intersection(*(_EXPORTED[name] for name, _ in _series(expression)))
 
 
-@pytest.mark.parametrize("expression", EXPRESSIONS)
+@pytest.mark.parametrize("expression", _EXPRESSIONS)
 def test_a_query_asks_for_series_and_labels_that_there_are(expression):
-    asked = list(series(expression))
+    asked = list(_series(expression))
     assert asked
     for name, labels in asked:
         assert labels <= _EXPORTED[name]
@@ -49,9 +67,9 @@ def test_a_query_asks_for_series_and_labels_that_there_are(expression):
         assert set(re.split(r", ?", labels)) <= set.union(*(_EXPORTED[name] for name, _ in asked))
 
 
-@pytest.mark.parametrize("expression", EXPRESSIONS)
+@pytest.mark.parametrize("expression", _EXPRESSIONS)
 def test_a_query_has_no_word_that_is_not_known(expression):
-    rest = _GROUPING.sub(" ", MATCHERS.sub(" ", expression))
+    rest = _GROUPING.sub(" ", _MATCHERS.sub(" ", expression))
     assert rest.count("(") == rest.count(")")
     called = set(re.findall(r"(\w+) ?\(", rest))
     assert called - {"or"} <= _FUNCTIONS
@@ -64,7 +82,7 @@ def test_a_query_has_no_word_that_is_not_known(expression):
 
 
 def test_every_variable_that_is_used_is_declared_and_every_one_is_used():
-    told = json.dumps([_PANELS, DASHBOARD["annotations"], DASHBOARD["templating"]])
+    told = json.dumps([_PANELS, _DASHBOARD["annotations"], _DASHBOARD["templating"]])
     used = {first or second for first, second in re.findall(r"\$(?:\{(\w+)\}|(\w+))", told)}
     assert used - _BUILT_IN - {"__all"} == set(_VARIABLES)
 
@@ -75,12 +93,12 @@ def test_choices_are_labels_that_there_are():
         assert asked
         assert asked[3] == name
         assert {name} <= _EXPORTED[asked[1]]
-        for metric, labels in series(asked[0]):
+        for metric, labels in _series(asked[0]):
             assert labels <= _EXPORTED[metric]
 
 
 def test_legends_name_labels_that_a_result_has():
-    for _, target in TARGETS:
+    for _, target in _TARGETS:
         assert set(re.findall(r"\{\{(\w+)\}\}", target["legendFormat"])) <= _left(target["expr"])
 
 
@@ -105,13 +123,13 @@ def test_panels_are_in_order_and_do_not_overlap():
 
 
 def test_it_is_a_dashboard_of_its_own_that_changes_none():
-    assert "id" not in DASHBOARD
-    assert (DASHBOARD["title"], DASHBOARD["uid"]) == ("syncrelay", "syncrelay")
-    assert DASHBOARD["schemaVersion"] >= 36
+    assert "id" not in _DASHBOARD
+    assert (_DASHBOARD["title"], _DASHBOARD["uid"]) == ("syncrelay", "syncrelay")
+    assert _DASHBOARD["schemaVersion"] >= 36
     assert _VARIABLES["datasource"]["type"] == "datasource"
 
 
 def test_every_metric_is_on_it_or_is_read_off_another():
-    shown = {name for expression in EXPRESSIONS for name, _ in series(expression)}
+    shown = {name for expression in _EXPRESSIONS for name, _ in _series(expression)}
     others = {f"syncrelay_set_{what}_seconds_{part}" for what in ("span", "latency") for part in ("count", "sum")}
     assert set(_EXPORTED) == shown | others
