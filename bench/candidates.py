@@ -1,4 +1,4 @@
-"""What can be measured: loads, and the relays that bear them."""
+"""Loads, and the relays that are measured under them."""
 
 import json
 import os
@@ -17,10 +17,10 @@ LARGE = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(HERE.parent / "configs/large_mess
 
 @dataclass(frozen=True)
 class Load:
-    """So many topics of a type, published at a rate, in groups that use them all.
+    """Topics of a type, published at a rate, and the groups that use them.
 
-    The topics of a set share a stamp and follow each other `apart_s`: by itself so that each message wakes the relay,
-    as sensors do not speak in one breath.
+    The topics of a set share a stamp and follow each other `apart_s`: by default so that each message wakes the
+    relay, as messages of real sensors do.
     """
 
     type_name: str
@@ -79,13 +79,13 @@ SWITCHES = {"scalars", "heard", "untold", "tapped"}
 
 
 class Workshop:
-    """Makes candidates, from a folder for their files; what they are called is in the help of compare.py."""
+    """Makes candidates with their files in a folder; the help of compare.py explains their names."""
 
     def __init__(self, folder):
         self._folder, self._files, self._floor = folder, 0, None
 
     def candidate(self, word, load):
-        """Return what a word names; raises ValueError where it names nothing, or nothing that can be had here."""
+        """Return the candidate of a name; raises ValueError if there is none, or if it cannot run here."""
         kind, _, settings = word.partition("@")
         asked = dict(setting.partition("=")[::2] for setting in settings.split(",") if setting)
         python = asked.pop("PYTHON", sys.executable)

@@ -1,7 +1,6 @@
-"""How fast the engine is: `python bench/engine.py`, printed as tables, ratios taken in this one run.
+"""Measures how fast the engine is: `python bench/engine.py` prints tables, with ratios taken in one run.
 
-Times are CPU times of this process, so that what else runs matters less; of five runs the
-best.
+Times are CPU times of this process, the best of five runs.
 """
 
 import argparse
@@ -87,7 +86,7 @@ def through_group(policy):
 
 
 def events_a_second(makers, messages):
-    """The best of RUNS for each of `makers`, in turns, so that what disturbs one disturbs all."""
+    """The best of RUNS for each of `makers`, which run in turns, so that disturbances hit all."""
     best = [float("inf")] * len(makers)
     for _ in range(RUNS):
         for number, make_add in enumerate(makers):
@@ -119,7 +118,7 @@ POLICIES = {
 
 
 def throughput(count):
-    """A row for every policy, number of inputs and queue; whether all meet their targets."""
+    """Print a row for every policy, number of inputs and queue; return whether all meet their targets."""
     print("| policy | inputs | queue | policy, ev/s | SyncGroup, ev/s | cost to queue 10 | |")
     print("|---|---|---|---|---|---|---|")
     all_good = True
@@ -145,7 +144,7 @@ def throughput(count):
 
 
 def against_plain_python(count):
-    """How much faster than a plain Python synchronizer, by stream, queue and slop."""
+    """Print how much faster the engine is than a plain Python synchronizer, by stream, queue and slop."""
     print("| stream | inputs | queue | slop | plain Python, stamps as ints | as objects | approximate_time | eager |")
     print("|---|---|---|---|---|---|---|---|")
     for stream, n_inputs, queue_size, slop in (
@@ -183,7 +182,7 @@ def worst_event(count, seeds):
 
 
 def longest(policies, messages):
-    """The slowest event, each by the best of its runs: what is left is not the machine's doing."""
+    """The slowest event; each event counts by the best of its runs, which leaves out disturbances."""
     took = [float("inf")] * len(messages)
     for policy in policies:
         gc.collect()

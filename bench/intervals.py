@@ -1,4 +1,4 @@
-"""What may be said of ratios that were measured round by round."""
+"""Intervals of ratios that were measured round by round."""
 
 import math
 import statistics

@@ -1,4 +1,4 @@
-"""What bench/peers.py asks of each tool, as its users would write it; runs in a venv where that tool is installed."""
+"""The jobs of bench/peers.py, written for each tool as its users would; each runs in a venv with that tool."""
 
 # ruff: noqa: PLC0415  each venv has one of the tools
 

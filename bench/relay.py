@@ -37,7 +37,7 @@ CHECKOUT = str(HERE.parent)
 
 
 class Tables:
-    """The parts of what is printed, by their names."""
+    """The tables by their names."""
 
     def __init__(self, workshop, rounds):
         self._workshop, self._rounds = workshop, rounds

@@ -1,4 +1,4 @@
-"""What stands around a relay under test: a process that publishes, and one that receives. Started by rounds.py.
+"""The publisher and the receiver around a relay under test, each a process that rounds.py starts.
 
     rig.py publish TYPE --size BYTES --rate HZ --together N --apart SECONDS TOPIC...
     rig.py receive TYPE --together N [--hear MANIFEST] TOPIC...
@@ -62,9 +62,9 @@ def payload_of(type_name, size):
 
 
 def receive(node, asked):
-    """In each turn take as many messages as stdin says, with stamps from a time on, until all came or is lost.
+    """For each line of stdin, take so many messages with stamps from a time on, until all came or none comes any more.
 
-    Says how much came, and the median age of sets.
+    Prints how many came, and the median age of sets.
     """
     kind, topics = TYPES[asked.type], asked.topics
     subscriptions = [node.create_subscription(kind, topic, print, PROFILE, raw=True) for topic in topics]

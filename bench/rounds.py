@@ -1,4 +1,4 @@
-"""Candidates that are started once and loaded in turns, and what a message cost each of them in each round."""
+"""Starts candidates once, loads them in turns, and measures what a message costs each of them in each round."""
 
 import contextlib
 import json
@@ -32,7 +32,7 @@ MIN_ROUNDS = 10
 
 
 class Turn(NamedTuple):
-    """What a candidate did in a round: CPU of its process a message by thread, and in all; median age of sets."""
+    """A candidate in a round: CPU of its process for each message, by thread and in all; median age of sets."""
 
     threads_us: Mapping[str, float]
     cpu_us: float
@@ -42,14 +42,14 @@ class Turn(NamedTuple):
 
 
 class Round(NamedTuple):
-    """A turn of each candidate, and the share of the machine that its neighbours took meanwhile."""
+    """A turn of each candidate, and the share of CPU time that the hypervisor gave to other machines."""
 
     turns: Sequence[Turn]
     stolen: float
 
 
 class Child:
-    """A process that is talked to line by line, and ended."""
+    """A process with which lines are exchanged."""
 
     def __init__(self, argv, environ, log, cwd=None):
         self.process = subprocess.Popen(
@@ -165,7 +165,7 @@ def machine_time():
 
 @contextlib.contextmanager
 def processes():
-    """Yield what starts a process, and end all in the end; what they said is shown where one failed."""
+    """Yield a function that starts a process; end all at the end, and print what they said if one failed."""
     children = []
     with tempfile.TemporaryDirectory() as name, (Path(name) / "log").open("w+") as log:
         kept = clean_environment() | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_LOG_DIR": name}
@@ -195,7 +195,7 @@ def free_domains():
 
 
 def in_turns(candidates, *, most=200, width=0.05):
-    """Load the candidates in turns, until each ratio to the first is known narrowly enough, or for so many rounds.
+    """Load the candidates in turns until the interval of each ratio to the first is narrow, or for `most` rounds.
 
     Returns the rounds that nothing disturbed, and how many there were; Ctrl-C ends it early.
     """

@@ -1,4 +1,4 @@
-"""What to compare with: a plain Python synchronizer by slop, as the field's Python one behaves.
+"""A plain Python synchronizer by slop, for comparison, which behaves as that of message_filters.
 
 Written from its semantics: a map of stamps per input, the candidates of every other input by distance, the
 product of the candidates walked until one fits within slop. Stamps are ints, its best case, or objects

@@ -1,4 +1,4 @@
-"""What a process has spent: CPU time by thread, and instructions where the kernel counts them."""
+"""The CPU time of a process by thread, and its instructions where the kernel counts them."""
 
 import contextlib
 import ctypes
@@ -21,7 +21,7 @@ class Thread(NamedTuple):
 
 
 def threads_ns(pid):
-    """What each thread of a process ran so far."""
+    """The CPU time of each thread of a process so far, in nanoseconds."""
     ran = {}
     for task in Path(f"/proc/{pid}/task").iterdir():
         # A thread may end meanwhile.
@@ -32,9 +32,9 @@ def threads_ns(pid):
 
 
 def by_purpose(ran, pid):
-    """Sum what threads of a process ran by what they are for.
+    """Sum the CPU time of threads by their purpose.
 
-    DDS names its threads. The one of the others that ran most takes the messages, be it the main thread or not.
+    DDS names its threads. Of the others, the busiest takes the messages, be it the main thread or not.
     """
     sums = dict.fromkeys(PURPOSES, 0)
     receiving = max((thread for thread in ran if not thread.name.startswith("dds.")), key=ran.get)

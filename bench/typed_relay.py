@@ -1,4 +1,4 @@
-"""What to compare with: a relay as the guides teach it, in rclpy with typed messages and a Python synchronizer.
+"""A relay as the guides teach it, for comparison: in rclpy, with typed messages and a Python synchronizer.
 
 typed_relay.py TYPE INPUT OUTPUT [TYPE INPUT OUTPUT ...]
 """

@@ -1,4 +1,4 @@
-"""A relay that neither watches itself nor tells of it: `untold.py FILE`. What saying why costs is the difference."""
+"""A relay without observation and reports: `untold.py FILE`. The difference to a relay is what saying why costs."""
 
 import sys
 from collections import deque
