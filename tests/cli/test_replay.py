@@ -109,6 +109,40 @@ def test_that_ros1_is_written_as_ros2_is_said(folder):
     assert "this is a ROS 1 recording: its messages are written as ROS 2 CDR" in done.stderr
 
 
+@pytest.fixture
+def replayed(folder):
+    """Replays the recording with more words: its first line, all that it printed, and what it said."""
+    (folder / "f.yaml").write_text(_file(policy="approximate_time_eager", slop="20ms"))
+
+    def replay(*words):
+        done = run_here("replay", "rig.mcap", "--config", "f.yaml", *words, folder=folder)
+        assert done.returncode == 0
+        return done.stdout.partition("\n")[0], done.stdout, done.stderr.splitlines()
+
+    return replay
+
+
+def test_a_fault_changes_what_comes_and_is_named(replayed):
+    assert replayed()[::2] == ("front: 40 sets", [])
+    sets, told, said = replayed("--what-if", "dead: /lidar from 2s", "--what-if", "offset: /lidar 5ms")
+    assert (sets, told.splitlines()[-1]) == ("front: 20 sets", "front:   /lidar: 20 received, 20 in sets, 0 dropped")
+    assert said == [
+        "syncrelay: faults laid over the recording (seed 0): `dead: /lidar from 2s`, `offset: /lidar 5ms`",
+        "syncrelay: front: 20 sets with the faults, 40 without",
+    ]
+
+
+def test_a_fault_that_changes_nothing_is_told(replayed):
+    sets, _, said = replayed("--what-if", "dead: /lidar from 30s")
+    why = "the first message of /lidar came after 0 s, the last after 3.9 s"
+    assert (sets, said[1]) == ("front: 40 sets", f"syncrelay: `dead: /lidar from 30s` changed nothing: {why}")
+
+
+def test_a_seed_decides_what_is_lost(replayed):
+    lost = ("--what-if", "drop: /lidar 50%", "--json", "--seed")
+    assert replayed(*lost, "1") == replayed(*lost, "1") != replayed(*lost, "2")
+
+
 def test_it_needs_no_ros(folder):
     script = "import sys; sys.modules['rclpy'] = None; from syncrelay.cli import main; sys.exit(main(sys.argv[1:]))"
     done = run_python("-c", script, "replay", "rig.mcap", "--config", "f.yaml", folder=folder)

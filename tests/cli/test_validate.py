@@ -68,13 +68,6 @@ def test_a_directory_is_checked_as_what_runs_together(folder, environ):
     assert "conf/a.yaml and conf/../conf/a.yaml are the same file: name each file once" in done.stderr
 
 
-def test_a_topic_of_two_groups_is_one_topic(folder, environ):
-    second = GOOD.partition("groups:\n")[2].replace("front", "back").replace("/b", "/c")
-    (folder / "two.yaml").write_text(GOOD + second)
-    done = run_here("validate", "two.yaml", folder=folder, environ=environ)
-    assert done.stdout == "two.yaml: ok, 2 groups, 3 topics\n"
-
-
 def test_a_dash_is_standard_input(folder, environ):
     done = run("validate", "-", folder=folder, environ=environ, stdin=GOOD)
     assert (done.returncode, done.stdout) == (0, "<stdin>: ok, 1 group, 2 topics\n")
