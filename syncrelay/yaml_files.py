@@ -12,14 +12,24 @@ _ENDINGS: Final = (".yaml", ".yml")
 
 
 def yaml_files(path: str) -> tuple[str, ...]:
+    """Return the YAML files of a directory in the order of their names.
+
+    What is no directory stands for itself, and so does one of which no files are read, see files_of.
+    """
+    try:
+        files = files_of(path) if path and Path(path).is_dir() else ()
+    except OSError:
+        return (path,)
+    return files if 0 < len(files) <= MOST_FILES else (path,)
+
+
+def files_of(folder: str) -> tuple[str, ...]:
     """Return the YAML files of a directory in the order of their names, one more than MOST_FILES at most.
 
-    What is no directory stands for itself. Those below it and hidden files, which editors and mounts leave there, are
-    not meant. Raises OSError for a directory that cannot be read.
+    Those below it and hidden files, which editors and mounts leave there, are not meant. Raises OSError for a directory
+    that cannot be read.
     """
-    if not path or not Path(path).is_dir():
-        return (path,)
-    found = (each for each in Path(path).iterdir() if each.suffix in _ENDINGS and not each.name.startswith("."))
+    found = (each for each in Path(folder).iterdir() if each.suffix in _ENDINGS and not each.name.startswith("."))
     return tuple(map(str, sorted(islice((each for each in found if not each.is_dir()), MOST_FILES + 1))))
 
 

@@ -124,20 +124,13 @@ class Parser(argparse.ArgumentParser):
     def refuse_repeated(self, files: Sequence[str]) -> None:
         """Refuse to read a file twice, whatever it is called; standard input can only be read once too."""
         named: dict[str, str] = {}
-        for file in chain.from_iterable(map(_listed, files)):
+        for file in chain.from_iterable(map(yaml_files, files)):
             place = file if file == "-" else os.path.realpath(file)
             if place in named:
                 first = named[place]
                 same = f"{file} is named twice" if first == file else f"{first} and {file} are the same file"
                 self.error(f"{same}: name each file once")
             named[place] = file
-
-
-def _listed(path: str) -> Sequence[str]:
-    try:
-        return yaml_files(path)
-    except OSError:
-        return [path]
 
 
 def positive(text: str) -> float:

@@ -62,20 +62,15 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
 
 def _check(files: Sequence[str]) -> Checked:
     from syncrelay.config import ConfigError, load
-    from syncrelay.config.source import listed, shown_name
+    from syncrelay.config.source import shown_name
+    from syncrelay.yaml_files import yaml_files
 
-    names: list[str] = []
-    for file in files:
-        try:
-            names += map(shown_name, listed(file))
-        except ConfigError:
-            # No directory, or one without files: it is itself at fault.
-            names.append(shown_name(file))
+    names = tuple(shown_name(file) for path in files for file in yaml_files(path))
     try:
         config = load(*files)
     except ConfigError as error:
-        return Checked(tuple(names), None, error.problems)
-    return Checked(tuple(names), config, config.notes)
+        return Checked(names, None, error.problems)
+    return Checked(names, config, config.notes)
 
 
 def _print_text(found: Sequence[Checked]) -> None:

@@ -47,7 +47,8 @@ def tag_of_mapping(value: Any) -> str:
     return "<mapping>" if isinstance(value, dict | Keys) else "<name>"
 
 
-def _not_negative(value: Any) -> int:
+def not_negative(value: Any) -> int:
+    """Return the nanoseconds of a duration of 0 or more; raises ValueError saying what to write instead."""
     nanoseconds = parse_duration(value)
     if nanoseconds < 0:
         raise ValueError(f"expected a duration of 0 or more, found {describe(value)}")
@@ -89,14 +90,14 @@ def _text(pattern: str, **limits: int) -> WithJsonSchema:
     return WithJsonSchema({"type": "string", "pattern": pattern, **limits})
 
 
-Duration = Annotated[int, BeforeValidator(_not_negative), WithJsonSchema(duration_schema(sign=r"\+?", minimum=0))]
+Duration = Annotated[int, BeforeValidator(not_negative), WithJsonSchema(duration_schema(sign=r"\+?", minimum=0))]
 """A duration of 0 or more, in nanoseconds."""
 
 _LONGEST_PAUSE_NS: Final = 100_000_000
 
 
 def _short(value: object) -> int:
-    pause = _not_negative(value)
+    pause = not_negative(value)
     if pause > _LONGEST_PAUSE_NS:
         raise ValueError("at most 100ms: all messages of the relay wait that long")
     return pause

@@ -23,10 +23,11 @@ from syncrelay.config.partial import partial_file
 from syncrelay.config.problems import ConfigError, Path, Problem, Severity
 from syncrelay.config.resolved import GroupConfig, resolve_groups, resolve_listen
 from syncrelay.config.sections import DiagnosticsConfig, NodeConfig
-from syncrelay.config.source import PATIENCE_S, Source, check_text, listed, read_source
+from syncrelay.config.source import PATIENCE_S, Source, check_text, read_source
 from syncrelay.config.translate import translate
 from syncrelay.config.typechecks import TypeChecks
 from syncrelay.config.yaml_tree import compose
+from syncrelay.yaml_files import yaml_files
 
 _LEAST: Final = "at least `version: 1` and `groups:`"
 _TESTS: Final = "this looks like a test file, which `syncrelay test` runs: expected a file with `groups:`"
@@ -67,19 +68,9 @@ def load(
     Together they have the groups of all and one `node`; `defaults` are for the groups of their own file. A pipe
     is waited for so many seconds. Raises ConfigError with everything that is wrong.
     """
-    reads: list[Callable[[], Source]] = []
-    for path in paths:
-        try:
-            files = listed(path)
-        except ConfigError as error:
-            reads.append(partial(_refuse, error))
-        else:
-            reads += [partial(read_source, file, patience_s=patience_s) for file in files]
+    files = (file for path in paths for file in yaml_files(path))
+    reads = [partial(read_source, file, patience_s=patience_s) for file in files]
     return _config(_parts(reads, environ), environ)
-
-
-def _refuse(error: ConfigError) -> Source:
-    raise error
 
 
 def load_text(

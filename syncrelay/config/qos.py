@@ -15,9 +15,8 @@ from pydantic import (
     field_validator,
 )
 
-from syncrelay.config.keys import MOST, NOT_NULL, Keys, duration_schema, tag_of_mapping
-from syncrelay.config.units import MAX_NS, parse_duration
-from syncrelay.config.wording import describe
+from syncrelay.config.keys import MOST, NOT_NULL, Keys, duration_schema, not_negative, tag_of_mapping
+from syncrelay.config.units import MAX_NS
 
 PresetName: TypeAlias = Literal[
     "system_default",
@@ -44,17 +43,11 @@ class QosPreset:
 def _qos_duration(value: Any) -> int:
     """Read our durations, and the {sec, nsec} of rosbag2's override files."""
     if not isinstance(value, dict):
-        nanoseconds = parse_duration(value)
-    elif value.keys() == {"sec", "nsec"} and all(type(part) is int and part >= 0 for part in value.values()):
+        return not_negative(value)
+    if value.keys() == {"sec", "nsec"} and all(type(part) is int and part >= 0 for part in value.values()):
         # rosbag2 writes "no limit" as more seconds than nanoseconds can count.
-        nanoseconds = min(value["sec"] * _NS_PER_SECOND + value["nsec"], MAX_NS)
-    else:
-        raise ValueError(
-            "expected a duration such as 100ms, or a mapping of sec and nsec with whole numbers of 0 or more"
-        )
-    if nanoseconds < 0:
-        raise ValueError(f"expected a duration of 0 or more, found {describe(value)}")
-    return nanoseconds
+        return int(min(value["sec"] * _NS_PER_SECOND + value["nsec"], MAX_NS))
+    raise ValueError("expected a duration such as 100ms, or a mapping of sec and nsec with whole numbers of 0 or more")
 
 
 _SEC_AND_NSEC: Final = {

@@ -130,15 +130,7 @@ class ConfigFiles:
         return True
 
     def _marks(self) -> dict[str, tuple[int, int, int] | None]:
-        return {file: _mark(Path(file)) for path in self._paths for file in _files(path)}
-
-
-def _files(path: str) -> tuple[str, ...]:
-    """Return the files of a directory, or the path itself if it is none or cannot be read."""
-    try:
-        return yaml_files(path)
-    except OSError:
-        return (path,)
+        return {file: _mark(Path(file)) for path in self._paths for file in yaml_files(path)}
 
 
 def _mark(path: Path) -> tuple[int, int, int] | None:

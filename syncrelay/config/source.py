@@ -13,7 +13,7 @@ from typing import Final
 
 from syncrelay.config.problems import ConfigError, Problem, Severity, Span
 from syncrelay.config.wording import nearest
-from syncrelay.yaml_files import MOST_FILES, yaml_files
+from syncrelay.yaml_files import MOST_FILES, files_of
 
 STDIN: Final = "-"
 # A file of a thousand groups with four topics each is half as large.
@@ -66,19 +66,6 @@ def shown_name(path: str) -> str:
     return "<stdin>" if path == STDIN else path or "''"
 
 
-def listed(path: str) -> tuple[str, ...]:
-    """Return the files of a directory, or the path where it is none. Raises ConfigError for one without files."""
-    try:
-        files = yaml_files(path)
-    except OSError as error:
-        raise _unreadable(path, f"cannot be read: {error.strerror}") from error
-    if not files:
-        raise _unreadable(path, "no *.yaml or *.yml file in this directory")
-    if len(files) > MOST_FILES:
-        raise _unreadable(path, f"more than {MOST_FILES} YAML files: is this the right directory?")
-    return files
-
-
 def read_source(path: str, *, patience_s: float = PATIENCE_S) -> Source:
     """Return the text of a file, `-` for standard input, which alone is waited for without end.
 
@@ -103,6 +90,10 @@ def read_source(path: str, *, patience_s: float = PATIENCE_S) -> Source:
 def _content(path: str, patience_s: float) -> bytes:
     """Return a file's bytes, at most one more than allowed. Raises TimeoutError for a pipe that does not end."""
     kind = _NO_FILES.get(stat.S_IFMT(Path(path).stat().st_mode))
+    if kind == "directory" and len(files := files_of(path)) > MOST_FILES:
+        raise _unreadable(path, f"more than {MOST_FILES} YAML files: is this the right directory?")
+    if kind == "directory" and not files:
+        raise _unreadable(path, "no *.yaml or *.yml file in this directory")
     if kind is not None:
         # Opening a device may have side effects.
         raise _unreadable(path, f"is a {kind}, expected a YAML file")

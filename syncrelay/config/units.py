@@ -39,7 +39,7 @@ _MEANT = {
     "minute": "min",
     "minutes": "min",
 }
-_DURATION = re.compile(r"([+-]?(?:[0-9]{1,40}(?:\.[0-9]{0,40})?|\.[0-9]{1,40})(?:[eE][+-]?[0-9]{1,3})?)\s*([^\W\d_]*)")
+_QUANTITY = re.compile(r"([+-]?(?:[0-9]{1,40}(?:\.[0-9]{0,40})?|\.[0-9]{1,40})(?:[eE][+-]?[0-9]{1,3})?)\s*([^\W\d_]*)")
 
 
 def parse_duration(value: object) -> int:
@@ -108,10 +108,7 @@ def _rate_above_0(value: object) -> Decimal:
 
 
 def _hertz(text: str) -> Decimal:
-    matched = _DURATION.fullmatch(text.strip())
-    if matched is None:
-        raise ValueError(f"expected a rate such as 10 Hz, found {describe(text)}")
-    number, unit = matched.groups()
+    number, unit = _number_and_unit(text, expected="a rate such as 10 Hz")
     if not unit:
         raise ValueError(f"the string {quoted(text)} has no unit: write {number} Hz, or {number} without quotes")
     if unit not in _HERTZ:
@@ -119,10 +116,10 @@ def _hertz(text: str) -> Decimal:
     return Decimal(number) * _HERTZ[unit]
 
 
-def _number_and_unit(text: str) -> tuple[str, str]:
-    matched = _DURATION.fullmatch(text.strip())
+def _number_and_unit(text: str, *, expected: str = "a duration such as 20ms") -> tuple[str, str]:
+    matched = _QUANTITY.fullmatch(text.strip())
     if matched is None:
-        raise ValueError(f"expected a duration such as 20ms, found {describe(text)}")
+        raise ValueError(f"expected {expected}, found {describe(text)}")
     number, unit = matched.groups()
     return number, unit
 

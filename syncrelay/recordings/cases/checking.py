@@ -10,7 +10,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 from syncrelay.config import ConfigError, GroupConfig, Problem
 from syncrelay.config.problems import Path
-from syncrelay.config.source import listed, shown_name
+from syncrelay.config.source import shown_name
 from syncrelay.errors import SyncRelayError
 from syncrelay.explain import UNREADABLE, Code, Distribution, EngineDriver
 from syncrelay.recordings.analysis.evaluation import Evaluation, evaluate
@@ -24,6 +24,7 @@ from syncrelay.recordings.cases.load import LoadedCase, Suite, load_suite
 from syncrelay.recordings.cases.models import InputExpectation
 from syncrelay.recordings.cases.sources import START, Arrival, arrivals, streams
 from syncrelay.sync import Match, Message, Outcome
+from syncrelay.yaml_files import yaml_files
 
 _P95: Final = 0.95
 
@@ -70,19 +71,13 @@ class Ran(NamedTuple):
 
 def run_files(paths: Sequence[str]) -> Iterator[Ran]:
     """Run the cases of test files, or of all files of a directory."""
-    for path in paths:
+    for file in (file for path in paths for file in yaml_files(path)):
         try:
-            files = listed(path)
+            suite = load_suite(file)
         except ConfigError as error:
-            yield Ran(shown_name(path), error.problems)
-            continue
-        for file in files:
-            try:
-                suite = load_suite(file)
-            except ConfigError as error:
-                yield Ran(shown_name(file), error.problems)
-            else:
-                yield from (Ran(shown_name(file), result) for result in check(suite))
+            yield Ran(shown_name(file), error.problems)
+        else:
+            yield from (Ran(shown_name(file), result) for result in check(suite))
 
 
 def check(suite: Suite) -> Iterator[Result]:
