@@ -217,5 +217,5 @@ def relay_form() -> Form:
             "version": "expected `version: 1`",
             "policy": f"expected {one_of(known.groups)}",
         },
-        kinds=known.groups,
+        kinds=(known.groups, known.topics),
     )

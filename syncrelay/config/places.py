@@ -3,7 +3,7 @@
 pydantic's places have the tags of unions in them, here in <>. The models tell a tag from a key that looks like one.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from types import UnionType
 from typing import Annotated, Any, NamedTuple, TypeAlias, Union, get_args, get_origin
 
@@ -36,18 +36,6 @@ def place(file: type[BaseModel], loc: Location) -> Place:
         elif step != "[key]" or index < len(loc) - 1 or get_origin(above) is not dict:
             above, kind, path = kind, _below(kind, step), (*path, step)
     return Place(path, next(_models(kind), file), last)
-
-
-def alternatives(file: type[BaseModel], loc: Location) -> Mapping[str, type[BaseModel]]:
-    """Return the models that could stand at a place below the first union on the way, by the tags of its branches."""
-    kind: Any = file
-    for index, step in enumerate(loc):
-        tagged = dict(_tagged(kind))
-        if step in tagged:
-            others = {str(tag).strip("<>"): (*loc[:index], tag, *loc[index + 1 :]) for tag in tagged}
-            return {tag: place(file, other).model for tag, other in others.items()}
-        kind = _below(kind, step)
-    return {}
 
 
 def _tagged(kind: Any) -> Iterator[tuple[str | int, Any]]:

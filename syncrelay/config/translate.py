@@ -1,7 +1,7 @@
 """pydantic's errors as problems: at the right key or value, in plain words, with the nearest valid word."""
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
 from syncrelay.config.document import Document, MappingNode, ScalarNode
-from syncrelay.config.places import Location, alternatives, place
+from syncrelay.config.places import Location, place
 from syncrelay.config.problems import Path, Problem
 from syncrelay.config.scalars import read_plain
 from syncrelay.config.wording import all_of, describe, one_of, or_nearest, quoted
@@ -39,14 +39,14 @@ _A_WORD: Final = re.compile(r"[\w./~-]{1,80}")
 class Form:
     """What the words of an error come from, for one kind of file: its model, and where in it keys can stand, in words.
 
-    `missing` says what is expected in place of some keys; of others, the examples of the models do. `kinds` are the
-    tags of unions by which people know the branches.
+    `missing` says what is expected in place of some keys; of others, the examples of the models do. `kinds` are models
+    of one level that differ by what people call them, which is the tag of a union.
     """
 
     file: type[BaseModel]
     levels: Mapping[str, type[BaseModel]]
     missing: Mapping[str, str]
-    kinds: Collection[str] = ()
+    kinds: Sequence[Mapping[str, type[BaseModel]]] = ()
 
     def path(self, loc: Location) -> Path:
         """Return the path of a place of pydantic's."""
@@ -58,11 +58,9 @@ class Form:
 
     def owners(self, loc: Location) -> str | None:
         """Return which kinds alone have a key that is missing in the kind at this place; None for other keys."""
-        key, kind = str(loc[-1]), place(self.file, loc).tag
-        others = alternatives(self.file, loc[:-1])
-        if kind not in self.kinds or key in place(self.file, loc[:-1]).model.model_fields:
-            return None
-        owners = [other for other in self.kinds if key in others[other].model_fields]
+        key, (_, model, kind) = str(loc[-1]), place(self.file, loc[:-1])
+        others = next((models for models in self.kinds if models.get(kind or "") is model), {})
+        owners = [other for other, its_model in others.items() if key in its_model.model_fields]
         verb = "does" if len(owners) == 1 else "do"
         return f"{kind} has no `{key}`, only {all_of(owners)} {verb}" if owners else None
 
@@ -72,8 +70,9 @@ class Form:
         if key in self.missing:
             return self.missing[key]
         kind = str(loc[-2]).strip("<>") if len(loc) > 1 else ""
+        is_known = any(kind in models for models in self.kinds)
         example = (self.model(loc[:-1]).model_fields[key].examples or [""])[0]
-        return f"{f'{kind} needs it, ' if kind in self.kinds else ''}for example `{key}: {example}`"
+        return f"{f'{kind} needs it, ' if is_known else ''}for example `{key}: {example}`"
 
 
 def translate(errors: Sequence[ErrorDetails], document: Document, form: Form) -> list[Problem]:

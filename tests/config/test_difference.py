@@ -155,6 +155,7 @@ def test_of_any_two_files_all_that_changes_is_told_and_nothing_else(seed: int):
     told = [change for change in found.groups if change.keys or change.removed or change.added or change.reordered]
     # Where the node changes, names do that are written as they were.
     assert found.restart or told == list(found.groups)
+    assert all(len({(key.topic, key.key) for key in group.keys}) == len(group.keys) for group in told)
     assert all(each.old != each.new for each in (*found.sections, *(key for group in told for key in group.keys)))
     sections = {each.key.partition(".")[0] for each in found.sections}
     pairs = {name: (getattr(old, name), getattr(new, name)) for name in ("node", "listen", "diagnostics")}

@@ -133,3 +133,11 @@ def test_everything_wrong_with_all_files_is_told_at_once(environ):
         "two.yaml:3:3: groups.front: the group `front` is also on line 3 of one.yaml: rename one of them",
         "two.yaml:4:13: groups.front.policy: unknown value `exakt_time`, did you mean `exact_time`?",
     ]
+
+
+def test_what_follows_from_a_fault_is_not_told_of_files_together_either(environ):
+    faulty = FRONT.replace("    topics", "    max_wait: 1 parsec\n    topics").replace(
+        "Image}", "Image, required: false}", 1
+    )
+    (error,) = errors(environ, one=faulty, two=file(group("rear", "/c", "/d")))
+    assert error.startswith("one.yaml:5:15: groups.front.max_wait: unknown unit `parsec`")
