@@ -30,67 +30,32 @@ class Case(NamedTuple):
     sets: int
 
 
-def _vehicle(data: Path, topics: Sequence[str]) -> list[Frame]:
-    return recordings.bag(data / recordings.VEHICLE, topics)
+def _approximate(slop_ns: int, *, inputs: int = 2) -> tuple[dict[str, Any], Callable[[], Policy]]:
+    """The keys of a group, and its policy."""
+    keys = {"policy": "approximate_time", "queue_size": ROOMY, "slop": f"{slop_ns}ns"}
+    return keys, lambda: ApproximateTime(n_inputs=inputs, queue_size=ROOMY, slop_ns=slop_ns)
 
 
-def _husky(data: Path, topics: Sequence[str]) -> list[Frame]:
-    return recordings.bag(data / recordings.HUSKY, topics)
+def _bag(name: str) -> Callable[[Path, Sequence[str]], list[Frame]]:
+    return lambda data, topics: recordings.bag(data / name, topics)
 
 
-def _tum(data: Path, _topics: Sequence[str]) -> list[Frame]:
-    return recordings.tum_stamps(data)
-
-
-def _pictures(data: Path, _topics: Sequence[str]) -> list[Frame]:
-    return recordings.tum_pictures(data)
-
-
-def _approximate(*, inputs: int, slop: int) -> Callable[[], Policy]:
-    return lambda: ApproximateTime(n_inputs=inputs, queue_size=ROOMY, slop_ns=slop)
-
-
-IMU_MAGNETIC_EXACT = Case(
-    "imu_magnetic_exact",
-    _vehicle,
-    ("/imu_data", "/magnetic_vector"),
-    {"policy": "exact_time", "queue_size": ROOMY},
-    lambda: ExactTime(n_inputs=2, queue_size=ROOMY),
-    0,
-)
-IMU_MAGNETIC = Case(
-    "imu_magnetic",
-    _vehicle,
-    ("/imu_data", "/magnetic_vector"),
-    {"policy": "approximate_time", "queue_size": ROOMY, "slop": "20us"},
-    _approximate(inputs=2, slop=20_000),
-    354,
-)
-IMU_SCAN = Case(
-    "imu_scan",
-    _vehicle,
-    ("/imu_data", "/scan"),
-    {"policy": "approximate_time", "queue_size": ROOMY, "slop": "30ms"},
-    _approximate(inputs=2, slop=30 * _MS),
-    178,
-)
-FIX_ODOM_IMU = Case(
-    "fix_odom_imu",
-    _husky,
-    ("/fix", "/husky_velocity_controller/odom", "/imu/data"),
-    {"policy": "approximate_time", "queue_size": ROOMY, "slop": "50ms"},
-    _approximate(inputs=3, slop=50 * _MS),
-    987,
-)
+_EXACT = {"policy": "exact_time", "queue_size": ROOMY}, lambda: ExactTime(n_inputs=2, queue_size=ROOMY)
+_VEHICLE, _HUSKY = _bag(recordings.VEHICLE), _bag(recordings.HUSKY)
+_IMU_MAGNETIC = ("/imu_data", "/magnetic_vector")
+_FIX_ODOM_IMU = ("/fix", "/husky_velocity_controller/odom", "/imu/data")
+IMU_MAGNETIC_EXACT = Case("imu_magnetic_exact", _VEHICLE, _IMU_MAGNETIC, *_EXACT, sets=0)
+IMU_MAGNETIC = Case("imu_magnetic", _VEHICLE, _IMU_MAGNETIC, *_approximate(20_000), sets=354)
+IMU_SCAN = Case("imu_scan", _VEHICLE, ("/imu_data", "/scan"), *_approximate(30 * _MS), sets=178)
+FIX_ODOM_IMU = Case("fix_odom_imu", _HUSKY, _FIX_ODOM_IMU, *_approximate(50 * _MS, inputs=3), sets=987)
 RGB_DEPTH = Case(
     "rgb_depth",
-    _tum,
+    lambda data, _: recordings.tum_stamps(data),
     (recordings.RGB, recordings.DEPTH),
-    {"policy": "approximate_time", "queue_size": ROOMY, "slop": "20ms"},
-    _approximate(inputs=2, slop=20 * _MS),
-    696,
+    *_approximate(20 * _MS),
+    sets=696,
 )
-PICTURES = RGB_DEPTH._replace(name="pictures", read=_pictures, sets=39)
+PICTURES = RGB_DEPTH._replace(name="pictures", read=lambda data, _: recordings.tum_pictures(data), sets=39)
 
 
 @pytest.mark.parametrize(
@@ -107,13 +72,9 @@ PICTURES = RGB_DEPTH._replace(name="pictures", read=_pictures, sets=39)
 def test_a_recording_that_is_played_gives_the_sets_of_cpp(
     stage: Stage, real_data: Path, cases: list[Case], speed: float
 ):
-    _relay_and_compare(stage, real_data, cases, speed=speed)
-
-
-def _relay_and_compare(stage: Stage, data: Path, cases: list[Case], *, speed: float) -> None:
-    """Relay one recording through a group per case, and compare every output with the engine's own sets."""
+    """One recording through a group per case: every output is compared with the engine's own sets."""
     topics = dict.fromkeys(topic for case in cases for topic in case.topics)
-    recording = cases[0].read(data, list(topics))
+    recording = cases[0].read(real_data, list(topics))
     types = relaying.topics_of(recording)
     groups = {
         case.name: {**case.group, "topics": inputs({t: types[t] for t in case.topics}, qos=LOSSLESS)} for case in cases
