@@ -1,14 +1,14 @@
 from functools import partial
 
 from syncrelay.sync import ApproximateEpsilonTime
-from tests.sync.support.timeline import TICK_NS, policy_cases
+from tests.sync.support.timeline import TICK_NS, drawn_cases
 
 
 def epsilon_time(inputs=2, queue=10, epsilon=2):
     return ApproximateEpsilonTime(n_inputs=inputs, queue_size=queue, epsilon_ns=epsilon * TICK_NS)
 
 
-test_drawn = policy_cases(
+test_drawn = drawn_cases(
     {
         "the oldest messages are a set if they lie within epsilon, itself included": (
             epsilon_time,

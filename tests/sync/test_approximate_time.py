@@ -1,7 +1,7 @@
 from functools import partial
 
-from syncrelay.sync import ApproximateTime, Message
-from tests.sync.support.timeline import TICK_NS, play_policy, policy_cases
+from syncrelay.sync import ApproximateTime, Message, SyncGroup
+from tests.sync.support.timeline import TICK_NS, drawn_cases, play_group
 
 
 def approximate(inputs=2, queue=10, slop=20, periods=None, **options):
@@ -13,7 +13,7 @@ def approximate(inputs=2, queue=10, slop=20, periods=None, **options):
 
 three = partial(approximate, 3)
 
-test_drawn = policy_cases(
+test_drawn = drawn_cases(
     {
         "a set leaves when the next message proves it the best": (
             approximate,
@@ -74,7 +74,7 @@ def test_an_overflow_is_excused_in_a_long_search_too_once_another_input_has_the_
         imu    |..............n..........
         arrive: A B C D E F G H I J K b c d e f g h i k l m n
     """
-    (overflow, search), _ = play_policy(approximate(4, slop=8), drawing)
+    (overflow, search), _ = play_group(SyncGroup(approximate(4, slop=8)), drawing)
     assert overflow == "K: A overflow"
     # The lidar may not be the pivot before k is the latest; then l is no longer too far.
     assert search == "n: " + "".join(f"{letter} too_far, " for letter in "bcdefghi") + "l superseded"

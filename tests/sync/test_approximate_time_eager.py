@@ -1,7 +1,7 @@
 from functools import partial
 
 from syncrelay.sync import ApproximateTimeEager
-from tests.sync.support.timeline import TICK_NS, policy_cases
+from tests.sync.support.timeline import TICK_NS, drawn_cases
 
 
 def eager(inputs=2, queue=10, slop=2):
@@ -10,7 +10,7 @@ def eager(inputs=2, queue=10, slop=2):
 
 three = partial(eager, 3, slop=5)
 
-test_drawn = policy_cases(
+test_drawn = drawn_cases(
     {
         "slop itself is within slop, slop 0 matches equal stamps": (
             partial(eager, slop=0),

@@ -16,7 +16,7 @@ from syncrelay.sync import (
     SyncGroup,
     Ticks,
 )
-from tests.sync.support.timeline import TICK_NS, play_group, play_policy
+from tests.sync.support.timeline import TICK_NS, play_group
 
 
 class Sizes(TypedDict):
@@ -31,6 +31,7 @@ POLICIES = [
     ApproximateTimeEager(**SIZES, slop_ns=2 * TICK_NS),
     ApproximateEpsilonTime(**SIZES, epsilon_ns=TICK_NS),
     LatestTime(**SIZES, trigger=0),
+    LatestAtTicks(**SIZES, ticks=Ticks(20)),
     EqualKey(**SIZES),
 ]
 
@@ -43,12 +44,6 @@ def drawing_in(docstring):
 
 @pytest.mark.parametrize("policy", POLICIES, ids=lambda policy: type(policy).__name__)
 def test_the_drawing_of_a_policy_is_what_it_does(policy):
-    left, drawn = play_policy(policy, drawing_in(type(policy).__doc__))
-    assert left == drawn
-    assert len(left) > 0
-
-
-def test_the_drawing_of_a_clock_as_trigger_is_what_it_does():
-    left, drawn = play_group(SyncGroup(LatestAtTicks(**SIZES, ticks=Ticks(20))), drawing_in(LatestAtTicks.__doc__))
+    left, drawn = play_group(SyncGroup(policy), drawing_in(type(policy).__doc__))
     assert left == drawn
     assert len(left) > 0

@@ -1,11 +1,11 @@
 from functools import partial
 
-from syncrelay.sync import Drop, DropReason, EqualKey, Match, Message
-from tests.sync.support.timeline import policy_cases
+from syncrelay.sync import EqualKey
+from tests.sync.support.timeline import drawn_cases
 
 equal_key = partial(EqualKey, n_inputs=2, queue_size=3)
 
-test_drawn = policy_cases(
+test_drawn = drawn_cases(
     {
         "messages of equal keys are a set, whatever their stamps": (
             equal_key,
@@ -38,15 +38,3 @@ test_drawn = policy_cases(
         ),
     }
 )
-
-
-def test_stamps_may_be_unset():
-    policy = equal_key()
-    first, second = Message(0, 0, "a", key="one"), Message(0, 0, "b", key="two")
-    other = Message(1, 0, "B", key="two")
-    assert policy.add(first) == []
-    assert policy.add(second) == []
-    *drops, match = policy.add(other)
-    assert drops == [Drop(first, DropReason.SUPERSEDED)]
-    assert isinstance(match, Match)
-    assert match.messages == (second, other)

@@ -1,12 +1,12 @@
 from functools import partial
 
 from syncrelay.sync import ExactTime
-from tests.sync.support.timeline import policy_cases
+from tests.sync.support.timeline import drawn_cases
 
 exact = partial(ExactTime, n_inputs=2, queue_size=10)
 three = partial(ExactTime, n_inputs=3, queue_size=10)
 
-test_drawn = policy_cases(
+test_drawn = drawn_cases(
     {
         "equal stamps on all inputs are a set, at once": (
             three,
@@ -24,6 +24,7 @@ test_drawn = policy_cases(
             right |AB
             arrive: a b B A
             -> B: a superseded, bB
+            -> A: A late
             """,
         ),
         "the limit is on distinct stamps over all inputs, and the oldest overflows": (

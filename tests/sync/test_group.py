@@ -18,7 +18,7 @@ from syncrelay.sync import (
     Restamp,
     SyncGroup,
 )
-from tests.sync.support.timeline import START_NS, TICK_NS, group_cases, stamp
+from tests.sync.support.timeline import START_NS, TICK_NS, drawn_cases, stamp
 
 
 def grouped(policy, *, optional=(), max_wait=None, period=None, **options):
@@ -51,7 +51,7 @@ def latest(max_age=None, **options):
 GAP = "." * 101
 """More than a second."""
 
-test_drawn = group_cases(
+test_drawn = drawn_cases(
     {
         "older than what its input last gave is late, and so is as old": (
             exact,

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from syncrelay.sync import Drop, DropReason, LatestAtTicks, Match, Message, Restamp, SyncGroup, Ticks
 from syncrelay.sync.latest_at_ticks import REST_NS
 from tests.sync.support.rigs import START, TICK, Step, options, run, steps, take
-from tests.sync.support.timeline import START_NS, TICK_NS, group_cases
+from tests.sync.support.timeline import START_NS, TICK_NS, drawn_cases
 
 
 def by_clock(inputs=2, queue=10, age=None, hz=20, **options):
@@ -21,7 +21,7 @@ def grouped(policy, *, max_wait=None, **options):
     return SyncGroup(policy, max_wait_ns=None if max_wait is None else max_wait * TICK_NS, **options)
 
 
-test_drawn = group_cases(
+test_drawn = drawn_cases(
     {
         "max_wait is how long a message may be on its way": (
             partial(by_clock, max_wait=3),

@@ -1,4 +1,4 @@
-"""Drawn cases for policies and groups alone; see syncrelay.recordings.cases.drawing for what is drawn how.
+"""Drawn cases for policies and groups; see syncrelay.recordings.cases.drawing for what is drawn how.
 
 A column is a tick of 10 ms.
 """
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import pytest
 
 from syncrelay.recordings.cases.drawing import parse as parse_drawing
-from syncrelay.sync import Drop, Match, Message
+from syncrelay.sync import Drop, Match, Message, SyncGroup
 
 TICK_NS = 10_000_000
 START_NS = 5_000_000_000
@@ -52,17 +52,6 @@ def told(outcome):
     return f"{outcome.message.payload} {outcome.reason.value}"
 
 
-def play_policy(policy, drawing):
-    """Feed the drawing to a policy: (what left, what was drawn to leave)."""
-    timeline = parse(drawing)
-    lines = []
-    for _, message in timeline.arrivals:
-        outcomes = policy.add(message)
-        if outcomes:
-            lines.append(f"{message.payload}: " + ", ".join(map(told, outcomes)))
-    return tuple(lines), timeline.expected
-
-
 def play_group(group, drawing, raw_stamp=lambda message: message.stamp):
     """Feed the drawing to a group whose driver meets every deadline: (what left, what was drawn to leave)."""
     timeline = parse(drawing)
@@ -82,23 +71,13 @@ def play_group(group, drawing, raw_stamp=lambda message: message.stamp):
     return tuple(lines), timeline.expected
 
 
-def policy_cases(cases):
-    """`cases`: a sentence -> (a function that makes the policy, a drawing)."""
+def drawn_cases(cases):
+    """`cases`: a sentence -> (a function that makes a policy or a group, a drawing)."""
 
     @pytest.mark.parametrize(("make", "drawing"), cases.values(), ids=cases)
     def test(make, drawing):
-        left, drawn = play_policy(make(), drawing)
-        assert left == drawn
-
-    return test
-
-
-def group_cases(cases):
-    """`cases`: a sentence -> (a function that makes the group, a drawing)."""
-
-    @pytest.mark.parametrize(("make", "drawing"), cases.values(), ids=cases)
-    def test(make, drawing):
-        left, drawn = play_group(make(), drawing)
+        made = make()
+        left, drawn = play_group(made if isinstance(made, SyncGroup) else SyncGroup(made), drawing)
         assert left == drawn
 
     return test
