@@ -29,8 +29,6 @@ _COMPARE: Final[Mapping[str, Callable[[Any, Any], bool]]] = MappingProxyType(
         ">=": operator.ge,
     }
 )
-# No number is below 0, and no share above 1.
-_LEAST: Final = Decimal(0)
 _WHOLE: Final = Decimal(1)
 # Shares, and durations in their unit, are printed with four decimals.
 _DIGITS: Final = Decimal("0.0001")
@@ -86,20 +84,6 @@ class Bound:
             step = Decimal(1) if rounding is None else _DIGITS * _SIZES[unit]
         return _written((found / step).to_integral_value(rounding or ROUND_HALF_EVEN) * step, unit)
 
-    @property
-    def always_holds(self) -> bool:
-        """Whether every possible value meets it."""
-        compare = _COMPARE[self.comparison]
-        is_whole = self.quantity is Quantity.SHARE and self.value == _WHOLE
-        return (compare is operator.ge and self.value == _LEAST) or (compare is operator.le and is_whole)
-
-    @property
-    def never_holds(self) -> bool:
-        """Whether no possible value meets it."""
-        compare = _COMPARE[self.comparison]
-        is_whole = self.quantity is Quantity.SHARE and self.value == _WHOLE
-        return (compare is operator.lt and self.value == _LEAST) or (compare is operator.gt and is_whole)
-
 
 def _written(number: Decimal, unit: str) -> str:
     return f"{(number / _SIZES[unit]).normalize():f}{unit}"
@@ -136,9 +120,12 @@ def _bound(quantity: Quantity) -> Callable[[object], Bound]:
 
 
 def _able_to_fail(bound: Bound) -> Bound:
-    if bound.always_holds:
+    """Refuse a bound that holds for the least, the greatest and its own value, or for none of them."""
+    greatest = _WHOLE if bound.quantity is Quantity.SHARE else Decimal("Infinity")
+    held = [_COMPARE[bound.comparison](value, bound.value) for value in (Decimal(0), bound.value, greatest)]
+    if all(held):
         raise ValueError(f"`{bound}` holds whatever is found, so it tests nothing")
-    if bound.never_holds:
+    if not any(held):
         raise ValueError(f"`{bound}` never holds, whatever is found")
     return bound
 

@@ -65,43 +65,31 @@ def size_of(place: str) -> int:
 
 
 def results_in(folder: Path) -> dict[str, ResultFile]:
-    """Flush a result to the disk, and return its files by their paths in its folder."""
+    """Return the files of a result by their paths in its folder."""
     found = {}
     for path in sorted(folder.rglob("*")):
-        if path.is_dir():
-            sync_folder(path)
-            continue
-        with path.open("rb") as file:
-            digest = file_digest(file, _blake).hexdigest()
-            os.fsync(file.fileno())
+        if not path.is_dir():
+            with path.open("rb") as file:
+                digest = file_digest(file, _blake).hexdigest()
             found[path.relative_to(folder).as_posix()] = ResultFile(path.stat().st_size, digest)
-    sync_folder(folder)
     return found
 
 
 def are_intact(folder: Path, files: Mapping[str, ResultFile]) -> bool:
     """Tell whether a folder holds exactly these files of a result, as they were written."""
     try:
-        names = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir()}
-        return names == files.keys() and all(_is_intact(folder / name, file) for name, file in files.items())
+        return results_in(folder) == files
     except OSError:
         return False
 
 
-def sync_folder(folder: Path) -> None:
-    """Flush the names in a folder to the disk (fsync)."""
-    number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+def flush(path: Path) -> None:
+    """Flush a file, or the names in a folder, to the disk (fsync)."""
+    number = os.open(path, os.O_RDONLY)
     try:
         os.fsync(number)
     finally:
         os.close(number)
-
-
-def _is_intact(path: Path, file: ResultFile) -> bool:
-    if path.stat().st_size != file.size:
-        return False
-    with path.open("rb") as content:
-        return file_digest(content, _blake).hexdigest() == file.hash
 
 
 def _of_url(word: str) -> Content:

@@ -15,7 +15,7 @@ from pydantic import AfterValidator, Field, InstanceOf, TypeAdapter
 
 from syncrelay.errors import OutputError, SyncRelayError
 from syncrelay.output_files import cannot_be_written
-from syncrelay.recordings.fleet.content import ResultFile, sync_folder
+from syncrelay.recordings.fleet.content import ResultFile, flush
 from syncrelay.recordings.fleet.recordings import is_result_name
 from syncrelay.recordings.fleet.task import NOTES, PROBLEMS
 
@@ -138,7 +138,7 @@ class Ledger:
             self._file.truncate(0)
             self._file.write(_HEAD)
             os.fsync(self._file.fileno())
-            sync_folder(self.folder)
+            flush(self.folder)
             return
         if not content.startswith(_HEAD):
             raise SyncRelayError(f"{self.folder / LEDGER}: is not a ledger of this syncrelay: name another folder")

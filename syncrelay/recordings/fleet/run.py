@@ -11,7 +11,7 @@ from typing import Final, Self
 from syncrelay import own_version
 from syncrelay.errors import SyncRelayError
 from syncrelay.output_files import cannot_be_written, remove_leftovers
-from syncrelay.recordings.fleet.content import size_of, sync_folder
+from syncrelay.recordings.fleet.content import flush, size_of
 from syncrelay.recordings.fleet.job import SCRATCH, Done, Engine, Failed, Finished, Job
 from syncrelay.recordings.fleet.ledger import Entry, Ledger, State
 from syncrelay.recordings.fleet.store import ResultStore
@@ -174,5 +174,5 @@ def _put_in_place(finished: Path, place: Path) -> None:
     if os.path.lexists(place):
         place.rename(former)
     finished.rename(place)
-    sync_folder(place.parent)
+    flush(place.parent)
     shutil.rmtree(former, ignore_errors=True)

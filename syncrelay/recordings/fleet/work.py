@@ -11,7 +11,7 @@ from typing import Final
 
 from syncrelay import own_version
 from syncrelay.errors import NO_SPACE, BagError, OutputError, SyncRelayError
-from syncrelay.recordings.fleet.content import Content, are_intact, content_of, marks_of, results_in
+from syncrelay.recordings.fleet.content import Content, are_intact, content_of, flush, marks_of, results_in
 from syncrelay.recordings.fleet.job import Done, Failed, Job, Kept, Outcome
 from syncrelay.recordings.fleet.ledger import LEDGER, Entry
 
@@ -71,6 +71,8 @@ def _done(job: Job, content: Content, folder: Path) -> Done:
     facts = job.task.run(job.source, folder)
     if marks_of(job.source.place) != content.marks:
         raise BagError(f"{job.source.shown}: was changed while it was read: is it still being recorded?")
+    for path in (*folder.rglob("*"), folder):
+        flush(path)
     files = results_in(folder)
     if job.store is not None:
         job.store.put(job.source.name, folder)
