@@ -10,6 +10,19 @@ from pathlib import Path
 from syncrelay.errors import BagError
 from syncrelay.recordings.fleet.task import Source, fingerprint_of
 
+OBEDIENT = """
+import sys
+from argparse import Namespace
+from syncrelay.cli.boundary import guarded
+from syncrelay.cli.fleet import do_on_many
+from syncrelay.cli.stop import Termination
+from tests.recordings.fleet.tasks import Obedient
+options = Namespace(into="out", engine=sys.argv[1], jobs=2, strict=False, overwrite=False, time_limit=None)
+with Termination():
+    sys.exit(guarded(lambda: do_on_many(Obedient(), sys.argv[2:], options)))
+"""
+"""A program that has an engine do the task on recordings."""
+
 
 @dataclass(frozen=True, slots=True)
 class Obedient:

@@ -15,31 +15,12 @@ import pytest
 from tests.cli.command import ROOT
 from tests.faults.extent import IS_LONG
 from tests.recordings.fleet.fleets import FILE, LEDGER, entries, make_fleet, replay_into, tree
-from tests.recordings.fleet.tasks import attempts_of
+from tests.recordings.fleet.tasks import OBEDIENT, attempts_of
+from tests.ros.processes import children_of, wait_until
 
 _DEADLINE_S = 60
 _KILLS = 50 if IS_LONG else 6
 ENVIRON = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONSAFEPATH": "1"}
-_OBEDIENT = """
-import sys
-from argparse import Namespace
-from syncrelay.cli.boundary import guarded
-from syncrelay.cli.fleet import do_on_many
-from syncrelay.cli.stop import Termination
-from tests.recordings.fleet.tasks import Obedient
-options = Namespace(into="out", engine="local", jobs=2, strict=False, overwrite=False, time_limit=None)
-with Termination():
-    sys.exit(guarded(lambda: do_on_many(Obedient(), sys.argv[1:], options)))
-"""
-
-
-def wait_until(condition):
-    """Return what a condition gives once it is something."""
-    end = time.monotonic() + _DEADLINE_S
-    while not (found := condition()):
-        assert time.monotonic() < end
-        time.sleep(0.005)
-    return found
 
 
 def is_alive(pid):
@@ -47,13 +28,6 @@ def is_alive(pid):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
     except OSError:
         return False
-
-
-def children(pid):
-    try:
-        return [int(each) for each in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-    except OSError:
-        return []
 
 
 def lines(out):
@@ -67,11 +41,13 @@ def at_work(folder):
         (folder / f"{name}.mcap").write_text(f"longer than the others: {name}")
     for name in ("x", "y"):
         (folder / f"{name}.mcap").write_text("hang")
-    words = [sys.executable, "-c", _OBEDIENT, "."]
+    words = [sys.executable, "-c", OBEDIENT, "local", "."]
     with subprocess.Popen(words, cwd=folder, env=ENVIRON, stdout=-1, stderr=-1, text=True) as command:
         try:
-            wait_until(lambda: all(map(attempts_of, (folder / "x.mcap", folder / "y.mcap"))))
-            yield command, wait_until(lambda: children(command.pid) if len(children(command.pid)) == 2 else None)
+            wait_until(
+                lambda: all(map(attempts_of, (folder / "x.mcap", folder / "y.mcap"))), "both workers", poll_s=0.005
+            )
+            yield command, children_of(command.pid)
         finally:
             command.kill()
 
@@ -100,7 +76,7 @@ def test_ctrl_c_of_a_terminal_which_reaches_the_workers_too_is_one_request(tmp_p
 def test_no_worker_outlives_a_command_that_is_killed(tmp_path):
     with at_work(tmp_path) as (command, workers):
         command.kill()
-        wait_until(lambda: not any(map(is_alive, workers)))
+        wait_until(lambda: not any(map(is_alive, workers)), "the end of the workers")
 
 
 @pytest.mark.faults
@@ -120,12 +96,18 @@ def test_a_run_that_is_killed_at_any_moment_ends_as_an_undisturbed_one(tmp_path,
             shutil.rmtree(tmp_path / "out")
         with subprocess.Popen(words, cwd=tmp_path, env=ENVIRON, stderr=-1, stdout=-1, text=True) as command:
             awaited = max(1, lines(tmp_path / "out") + chance.randint(0, 2))
-            wait_until(lambda: lines(tmp_path / "out") >= awaited or command.poll() is not None)  # noqa: B023
-            for pid in children(command.pid)[: chance.randint(0, 1)]:
+            wait_until(
+                lambda awaited=awaited, command=command: (
+                    lines(tmp_path / "out") >= awaited or command.poll() is not None
+                ),
+                "a line of the ledger",
+                poll_s=0.005,
+            )
+            for pid in children_of(command.pid)[: chance.randint(0, 1)]:
                 os.kill(pid, signal.SIGKILL)
                 killed["worker"] += 1
             time.sleep(chance.random() * 0.03)
-            workers = children(command.pid)
+            workers = children_of(command.pid)
             number = chance.choice((signal.SIGKILL, signal.SIGKILL, signal.SIGINT, signal.SIGTERM))
             command.send_signal(number)
             _, said = command.communicate()
@@ -133,7 +115,7 @@ def test_a_run_that_is_killed_at_any_moment_ends_as_an_undisturbed_one(tmp_path,
             # Python that is just starting or ending handles signals in its own way.
             assert command.returncode == 128 + number or "ended by" not in said
             killed["command"] += command.returncode != 0
-            wait_until(lambda: not any(map(is_alive, workers)))  # noqa: B023
+            wait_until(lambda workers=workers: not any(map(is_alive, workers)), "the end of the workers")
     ended = replay_into(tmp_path)
     assert ended.returncode == 0
     assert tree(tmp_path / "out") == tree(tmp_path / "undisturbed")

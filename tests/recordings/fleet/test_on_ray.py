@@ -14,6 +14,7 @@ from syncrelay.cli.demo import record, shipped_config
 from tests.cli.command import ROOT
 from tests.faults.extent import IS_LONG
 from tests.recordings.fleet.fleets import FILE, make_fleet, replay_into, tree
+from tests.recordings.fleet.tasks import OBEDIENT
 
 pytestmark = [
     pytest.mark.ray,
@@ -55,23 +56,10 @@ def test_it_leaves_what_this_machines_cores_leave(isolated, tmp_path):
     assert tree(tmp_path / "ray") == tree(tmp_path / "local")
 
 
-_TASKS = """
-import sys
-from argparse import Namespace
-from syncrelay.cli.boundary import guarded
-from syncrelay.cli.fleet import do_on_many
-from syncrelay.cli.stop import Termination
-from tests.recordings.fleet.tasks import Obedient
-options = Namespace(into="out", engine="ray", jobs=2, strict=False, overwrite=False, time_limit=None)
-with Termination():
-    sys.exit(guarded(lambda: do_on_many(Obedient(), sys.argv[1:], options)))
-"""
-
-
 def test_a_worker_that_dies_and_a_bug_are_their_recordings_alone(isolated, tmp_path):
     for name, text in {"a": "good", "b": "die 1", "c": "die 9", "d": "break", "e": "refuse"}.items():
         (tmp_path / f"{name}.mcap").write_text(text)
-    ended = isolated("-c", _TASKS, ".", folder=tmp_path)
+    ended = isolated("-c", OBEDIENT, "ray", ".", folder=tmp_path)
     assert (ended.returncode, ended.stdout) == (70, "out: 5 recordings: 2 done, 3 failed\n")
     assert "c.mcap: its worker was lost (WorkerCrashedError), or took longer than --time-limit, 3 times" in ended.stderr
     assert "ZeroDivisionError" in ended.stderr
@@ -82,7 +70,7 @@ def test_a_worker_that_dies_and_a_bug_are_their_recordings_alone(isolated, tmp_p
 _SIGNALLED = """
 import os, signal, subprocess, sys, time
 from pathlib import Path
-words = ["-c", sys.argv[2], "."]
+words = ["-c", sys.argv[2], "ray", "."]
 with subprocess.Popen([sys.executable, *words], stderr=subprocess.PIPE, text=True) as command:
     while not Path("x.attempts").exists():
         assert command.poll() is None, command.stderr.read()
@@ -122,7 +110,7 @@ print(code, told)
 )
 def test_nothing_of_a_cluster_that_was_started_is_left_when_the_command_ends(number, code, told, isolated, tmp_path):
     (tmp_path / "x.mcap").write_text("hang")
-    ended = isolated("-c", _SIGNALLED, str(int(number)), _TASKS, folder=tmp_path)
+    ended = isolated("-c", _SIGNALLED, str(int(number)), OBEDIENT, folder=tmp_path)
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout.startswith(f"{code} ")
     assert told in ended.stdout
