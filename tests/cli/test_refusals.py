@@ -47,6 +47,13 @@ _REFUSED = f"""
 2 | analyze rig.mcap /camera | name 2 topics or more
 2 | analyze rig.mcap rig.mcap --config f.yaml --html new.html | --write and --html are for one recording, found 2
 2 | analyze rig.mcap --jobs 2 | --jobs goes with --into
+2 | analyze rig.mcap --engine ray | --engine goes with --into
+2 | analyze rig.mcap --into new --time-limit 0s | argument --time-limit: expected a duration above 0, found 0s
+2 | analyze rig.mcap --into new --json | --json and --robot are about groups
+2 | analyze rig.mcap --config f.yaml --into new --write x.yaml | --write and --html are for one recording
+2 | analyze rig.mcap --config f.yaml --into new --html x.html | --write and --html are for one recording
+2 | analyze rig.mcap --config f.yaml --robot '{{robot}}/*' | --robot goes with --into
+2 | analyze rig.mcap --config f.yaml --into new --robot '{{day}}/*' | --robot {{day}}/*: expected {{robot}} once
 1 | analyze rig.mcap /camera /lidr | /lidr is not in the recording, did you mean `/lidar`?
 1 | analyze none.mcap /camera /lidar | none.mcap: no such file or folder
 1 | analyze {_LONG} /camera /lidar | {_LONG}: cannot be read: File name too long
@@ -58,6 +65,11 @@ _REFUSED = f"""
 2 | replay rig.mcap --config f.yaml --what-if 'lat: /x 3ms' | argument --what-if: `lat: /x 3ms` is not a fault, did you
 2 | replay rig.mcap --config f.yaml --what-if 'dead: /lida' | `dead: /lida`: there is no topic `/lida`, did you mean
 2 | replay rig.mcap --config f.yaml --jobs 2 | --jobs goes with --into
+2 | replay rig.mcap --config f.yaml --strict | --strict goes with --into
+2 | replay rig.mcap --config f.yaml --overwrite | --overwrite goes with --into
+2 | replay rig.mcap --config f.yaml --time-limit 2min | --time-limit goes with --into
+2 | replay rig.mcap --config f.yaml --into new --time-limit 2 | argument --time-limit: `2` has no unit, expected one
+2 | replay rig.mcap --config f.yaml --into new -o x.mcap | --output, --json and --drops are for one replay
 1 | replay none.mcap --config f.yaml | none.mcap: no such file or folder
 1 | replay {_LONG} --config f.yaml | {_LONG}: cannot be read: File name too long
 1 | replay f.yaml --config f.yaml | f.yaml: is not a recording

@@ -124,43 +124,6 @@ def test_a_recording_without_a_required_topic_is_told_each_time(tmp_path):
         assert "half.mcap: front: /lidar is not in the recording" in ended.stderr
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (("replay", "bags", "--config", FILE, "--strict"), "--strict goes with --into"),
-        (("replay", "bags", "--config", FILE, "--overwrite"), "--overwrite goes with --into"),
-        (("replay", "bags", "--config", FILE, "--time-limit", "2min"), "--time-limit goes with --into"),
-        (
-            ("replay", "bags", "--config", FILE, "--into", "out", "--time-limit", "2"),
-            "has no unit, expected one such as",
-        ),
-        (("analyze", "bags", "--into", "out", "--time-limit", "0s"), "expected a duration above 0, found 0s"),
-        (("analyze", "bags", "--engine", "ray"), "--engine goes with --into"),
-        (("replay", "bags", "--config", FILE, "--jobs", "2"), "--jobs goes with --into"),
-        (
-            ("replay", "bags", "--config", FILE, "--into", "o", "-o", "x.mcap"),
-            "--into writes the sets of each recording",
-        ),
-        (
-            ("analyze", "bags", "--config", FILE, "--into", "o", "--write", "x.yaml"),
-            "--write and --html are for one recording",
-        ),
-        (
-            ("analyze", "bags", "--config", FILE, "--into", "o", "--html", "x.html"),
-            "--write and --html are for one recording",
-        ),
-        (("analyze", "bags", "--into", "o", "--json"), "--json and --robot are about groups"),
-        (("analyze", "bags", "--config", FILE, "--into", "o", "--robot", "{day}/*"), "expected {robot} once"),
-        (("analyze", "bags", "--config", FILE, "--robot", "{robot}/*"), "--robot goes with --into"),
-    ],
-)
-def test_options_that_make_no_sense_together_are_told(words, told, done):
-    ended = run(*words, folder=done)
-    assert ended.returncode == 2
-    assert told in ended.stderr
-    assert not (done / "o").exists()
-
-
 def test_on_a_terminal_progress_is_one_line_that_is_gone_at_the_end(done, tmp_path):
     words = ("replay", str(done / "bags"), "--config", str(done / FILE), "--into", "out")
     with on_terminal([sys.executable, "-m", "syncrelay", *words], folder=tmp_path, environ={}) as terminal:
