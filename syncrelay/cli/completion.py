@@ -69,9 +69,14 @@ def complete() -> int:
     if ROS_ARGS in words:
         return DONE
     has_command = bool(words) and words[0] in COMMANDS
-    parser = COMMANDS[words[0]].parser() if has_command else _relay_parser(words)
+    parser = COMMANDS[words[0]].parser() if has_command else run.parser()
+    if not words:
+        # The first word may be a command, or an option of the relay.
+        parser.add_argument("command", metavar="COMMAND", nargs="?")
     parser.add_help_option()
-    _set_completers(parser)
+    for action in parser.actions:
+        if action.choices is None:
+            action.completer = COMPLETERS.get(str(action.metavar), _nothing)  # type: ignore[attr-defined]
     has_positionals = any(not action.option_strings for action in parser.actions)
     os.environ["_ARGCOMPLETE"] = str(start + 1 + has_command)
     ExclusiveCompletionFinder()(
@@ -88,20 +93,6 @@ def complete() -> int:
 def _is_start(words: Sequence[str], place: int) -> bool:
     is_program = Path(words[place]).name == _PROGRAM
     return is_program and (place == 0 or _BEFORE.fullmatch(words[place - 1]) is not None)
-
-
-def _relay_parser(words: Sequence[str]) -> Parser:
-    """Return the relay's parser; as the first word, a command may stand too."""
-    parser = run.parser()
-    if not words:
-        parser.add_argument("command", metavar="COMMAND", nargs="?")
-    return parser
-
-
-def _set_completers(parser: Parser) -> None:
-    for action in parser.actions:
-        if action.choices is None:
-            action.completer = COMPLETERS.get(str(action.metavar), _nothing)  # type: ignore[attr-defined]
 
 
 def _nothing(**_: Any) -> Iterable[str]:

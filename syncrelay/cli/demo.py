@@ -14,6 +14,7 @@ from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
 from syncrelay.cli.commands import is_installed, line_to_install
 from syncrelay.cli.parser import Parser, positive, seed
 from syncrelay.cli.stop import StopRequest
+from syncrelay.cli.top import can_draw
 from syncrelay.printable import printable
 
 if TYPE_CHECKING:
@@ -156,14 +157,12 @@ def isolation(environ: Mapping[str, str]) -> dict[str, str]:
 @contextmanager
 def _view() -> Iterator[Show]:
     """Draw on the whole terminal where that can be, else print a plain line a second."""
-    # Not rich's is_terminal: FORCE_COLOR makes that true for a pipe.
-    is_terminal = sys.stdout.isatty() and os.environ.get("TERM", "dumb") not in {"dumb", "unknown"}
-    can_draw = is_terminal and sys.stdout.encoding.lower().startswith("utf")
-    if can_draw and is_installed("top"):
+    is_drawn = can_draw(sys.stdout)
+    if is_drawn and is_installed("top"):
         with _drawing() as show:
             yield show
         return
-    if can_draw:
+    if is_drawn:
         remark(f"this is text, as the packages that draw it are not installed\n  {line_to_install('top')}")
     from syncrelay.top.plain import line_of
 

@@ -84,7 +84,10 @@ def _from_graph(seconds: float) -> "Proposal":
     try:
         proposal = propose_for(inventory_of(list(_streams(heard))), source=f"{seconds:g} s of the graph")
     except NothingToMatchError as error:
-        raise NothingToMatchError("\n  ".join([str(error), *without, _what_helps(heard)])) from error
+        helps = "listen longer with --seconds N, or write `stamp: receive` for topics without stamps"
+        if not (heard.topics or heard.headerless or heard.unusable):
+            helps = "nobody publishes anything that can be used here: start the nodes, or run `syncrelay doctor --live`"
+        raise NothingToMatchError("\n  ".join([str(error), *without, helps])) from error
     return replace(proposal, left_out=(*proposal.left_out, *without))
 
 
@@ -99,9 +102,3 @@ def _streams(heard: "Heard") -> "Iterator[tuple[Channel, Stream]]":
         stream = Stream(topic.name, topic.type, received=topic.received, places=topic.places)
         stream.stamps.extend(UNREADABLE if stamp is None else stamp for stamp in topic.stamps)
         yield Channel(number, topic.name, topic.type, Encoding.CDR, qos=(profile,)), stream
-
-
-def _what_helps(heard: "Heard") -> str:
-    if not (heard.topics or heard.headerless or heard.unusable):
-        return "nobody publishes anything that can be used here: start the nodes, or run `syncrelay doctor --live`"
-    return "listen longer with --seconds N, or write `stamp: receive` for topics without stamps"

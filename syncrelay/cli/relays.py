@@ -1,7 +1,7 @@
 """The relays that a command talks to: all that answer, or the one that is named."""
 
 from syncrelay.errors import SyncRelayError
-from syncrelay.top.client import Answer, Search, base_urls, search
+from syncrelay.top.client import Answer, base_urls, search
 
 
 def find(named: str | None, *, otherwise: str) -> tuple[Answer, ...]:
@@ -12,7 +12,10 @@ def find(named: str | None, *, otherwise: str) -> tuple[Answer, ...]:
     found = search(base_urls(named))
     if not found.relays:
         where = "on this machine" if named is None else f"at {named}"
-        raise SyncRelayError(f"no relay answers {where}{_others(found)}\n{otherwise}")
+        # All ports of a machine that is off or unknown give the same reason, which is said once.
+        reasons = {text.partition(": ")[2]: text for text in reversed(found.others)}
+        others = "".join(f"\n  {text}" for text in reversed(reasons.values()))
+        raise SyncRelayError(f"no relay answers {where}{others}\n{otherwise}")
     return found.relays
 
 
@@ -39,9 +42,3 @@ def otherwise(named: str | None) -> str:
         "  A relay on another machine answers only if its file says\n"
         "  `metrics: {listen: 0.0.0.0:9464}` and no firewall is in between."
     )
-
-
-def _others(found: Search) -> str:
-    # All ports of a machine that is off or unknown give the same reason, which is said once.
-    reasons = {text.partition(": ")[2]: text for text in reversed(found.others)}
-    return "".join(f"\n  {text}" for text in reversed(reasons.values()))

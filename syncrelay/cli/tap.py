@@ -14,7 +14,6 @@ from syncrelay.printable import printable
 from syncrelay.sync.messages import DropReason
 
 if TYPE_CHECKING:
-    from syncrelay.top.client import Answer
     from syncrelay.top.tap import TapAnswer
 
 # Each time costs the relay most of a millisecond, whatever it has to tell.
@@ -57,7 +56,10 @@ def command(_parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
 
     relay = find_one(arguments.url, otherwise=otherwise(arguments.url))
     groups = [] if arguments.group is None else [arguments.group]
-    _require_names(relay, groups, arguments.input)
+    # One that is just starting may not have told its groups yet.
+    chosen = [group for group in relay.status.groups if not groups or group.name in groups]
+    _require(groups, [group.name for group in relay.status.groups], "group")
+    _require(arguments.input, dict.fromkeys(each.topic for group in chosen for each in group.inputs), "input")
     woken = Wakeup()
     stop.defer()
     stop.wake_with(woken.set)
@@ -94,14 +96,8 @@ def _say_lost(answer: "TapAnswer") -> None:
         remark(f"lost {counted(answer.lost, 'line')}: sets and drops of all groups left faster than they were read")
 
 
-def _require_names(relay: "Answer", groups: Collection[str], inputs: Collection[str]) -> None:
-    """Refuse what the relay does not have; one that is just starting may not have told yet. Raises UsageError."""
-    chosen = [group for group in relay.status.groups if not groups or group.name in groups]
-    _require(groups, [group.name for group in relay.status.groups], "group")
-    _require(inputs, dict.fromkeys(each.topic for group in chosen for each in group.inputs), "input")
-
-
 def _require(asked: Collection[str], there: Collection[str], what: str) -> None:
+    """Raise UsageError for what a relay does not have."""
     from syncrelay.config.wording import did_you_mean, quoted
 
     for name in asked:

@@ -4,7 +4,7 @@ import json
 import os
 import sys
 from argparse import Namespace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from syncrelay.cli.boundary import DONE, put
 from syncrelay.cli.commands import is_installed, line_to_install
@@ -73,6 +73,13 @@ def why_no_screen() -> str | None:
     # Keys come from stdin and the screen goes to stderr; who redirects stdout wants text.
     if not all(stream.isatty() for stream in (sys.stdin, sys.stdout, sys.stderr)):
         return "top needs a terminal, and there is none here"
-    if os.environ.get("TERM", "dumb") in {"dumb", "unknown"} or not sys.stderr.encoding.lower().startswith("utf"):
+    if not can_draw(sys.stderr):
         return "top cannot draw on this terminal: check TERM and LANG"
     return None
+
+
+def can_draw(stream: TextIO) -> bool:
+    """Tell whether a stream is a terminal that draws."""
+    # Not rich's is_terminal: FORCE_COLOR makes that true for a pipe.
+    is_terminal = stream.isatty() and os.environ.get("TERM", "dumb") not in {"dumb", "unknown"}
+    return is_terminal and stream.encoding.lower().startswith("utf")

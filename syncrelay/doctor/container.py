@@ -65,10 +65,14 @@ def check_isolation(found: Isolation, environ: Mapping[str, str]) -> Iterator[Di
 def look_at_isolation(interfaces: Sequence[Interface], *, root: Path = Path("/")) -> Isolation:
     """Return what shuts this process off; the files of the system are read below `root`."""
     limits = sorted(_task_limits(root))
+    mounts = _text(root / "proc/self/mountinfo").splitlines()
+    # proc(5): ... mount point ... - type source options
+    sources = [line.partition(" - ")[2].split()[1] for line in mounts if line.split()[4:5] == ["/dev/shm"]]  # noqa: S108
     return Isolation(
         container=_container(root),
         host_network=any(each.hardware or each.name.startswith(_OF_A_HOST) for each in interfaces),
-        private_shm=_has_private_shm(_text(root / "proc/self/mountinfo")),
+        # What is mounted there last is what container engines make for one container.
+        private_shm=sources[-1:] == ["shm"],
         task_limit=limits[0][0] if limits else None,
         task_limit_of=limits[0][1] if limits else "",
     )
@@ -80,17 +84,6 @@ def _container(root: Path) -> str | None:
             return f"/{sign}"
     groups = _text(root / "proc/1/cgroup")
     return next((f"/proc/1/cgroup: {word}" for word in _RUNTIMES if word in groups), None)
-
-
-def _has_private_shm(mounts: str) -> bool:
-    """Whether what is mounted last at /dev/shm is what container engines make for one container: named `shm`."""
-    sources = [_source(line) for line in mounts.splitlines() if line.split()[4:5] == ["/dev/shm"]]  # noqa: S108
-    return bool(sources) and sources[-1] == "shm"
-
-
-def _source(line: str) -> str:
-    # proc(5): ... - type source options
-    return line.partition(" - ")[2].split()[1]
 
 
 def _task_limits(root: Path) -> Iterator[tuple[int, str]]:

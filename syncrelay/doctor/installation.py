@@ -144,7 +144,8 @@ def _python(found: Installation) -> str:
 def look_at_installation(environ: Mapping[str, str]) -> Installation:
     """Return what Python would import, and what the environment names beside it."""
     prefixes = _listed(environ, "AMENT_PREFIX_PATH")
-    rclpy = _folder_of("rclpy")
+    spec = importlib.util.find_spec("rclpy")
+    rclpy = Path(spec.origin).parent if spec and spec.origin else None
     own = Path(sys.prefix).resolve()
     return Installation(
         python=sys.version_info[:2],
@@ -172,11 +173,6 @@ def _version_of(distribution: str) -> str | None:
 
 def _listed(environ: Mapping[str, str], name: str) -> list[Path]:
     return [Path(entry) for entry in environ.get(name, "").split(os.pathsep) if entry]
-
-
-def _folder_of(package: str) -> Path | None:
-    spec = importlib.util.find_spec(package)
-    return Path(spec.origin).parent if spec and spec.origin else None
 
 
 def _holds_ros(prefix: Path) -> bool:

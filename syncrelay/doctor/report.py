@@ -109,7 +109,7 @@ def verdict(diagnoses: Sequence[Diagnosis]) -> str:
 
 def as_json(examination: Examination) -> dict[str, Any]:
     """Return what json.dumps takes."""
-    installation = examination.installation
+    installation, observed = examination.installation, examination.observed
     return {
         "ok": is_ok(examination),
         "python": f"{installation.python[0]}.{installation.python[1]}",
@@ -119,12 +119,6 @@ def as_json(examination: Examination) -> dict[str, Any]:
         "discovery_range": examination.discovery_range,
         "receives_by": examination.path or None,
         "diagnoses": [{**asdict(each), "severity": each.severity.value} for each in examination.diagnoses],
-        **_observed_as_json(examination.observed),
+        "graph": None if observed is None else {"seconds": observed.seconds, **asdict(observed.graph)},
+        "groups": [] if observed is None else [group_of(report).as_dict() for report in observed.reports],
     }
-
-
-def _observed_as_json(observed: Observed | None) -> dict[str, Any]:
-    if observed is None:
-        return {"graph": None, "groups": []}
-    graph = {"seconds": observed.seconds, **asdict(observed.graph)}
-    return {"graph": graph, "groups": [group_of(report).as_dict() for report in observed.reports]}

@@ -4,11 +4,12 @@ import os
 import pwd
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from syncrelay.config.wording import counted
 from syncrelay.doctor.diagnosis import Diagnosis, error, info
 from syncrelay.doctor.discovery import ports_of
 from syncrelay.fastdds_files import FOLDER, NAME, is_locked, locks_of
@@ -118,21 +119,14 @@ def _stale(found: SharedMemory) -> Iterator[Diagnosis]:
     if not stale:
         return
     owners = sorted({each.owner for each in stale if each.uid != found.uid})
+    size = _size(sum(each.size for each in stale))
     whose = f", some of {', '.join(owners)}" if owners else ""
     yield info(
         "shm_stale",
-        f"{_counted(stale)} in /dev/shm left by processes that were killed: {_size(_bytes(stale))}{whose}",
+        f"{counted(len(stale), 'Fast DDS file')} in /dev/shm left by processes that were killed: {size}{whose}",
         impact="they take up memory until somebody removes them; messages are not affected",
         fix=f"at any time, in bash{' as root' if owners else ''}; files in use are left alone:\n{_CLEAN}",
     )
-
-
-def _bytes(files: Sequence[ShmFile]) -> int:
-    return sum(each.size for each in files)
-
-
-def _counted(files: Sequence[ShmFile]) -> str:
-    return "1 Fast DDS file" if len(files) == 1 else f"{len(files)} Fast DDS files"
 
 
 def _size(count: int) -> str:
@@ -169,13 +163,10 @@ def _files(folder: Path) -> Iterator[ShmFile]:
             # Its process ended just now.
             continue
         port = int(found[1]) if found[1] else None
-        yield ShmFile(path.name, status.st_size, status.st_uid, _user(status.st_uid), _is_live(path), port)
-
-
-def _is_live(path: Path) -> bool:
-    """Whether a process holds a lock beside a file; without a lock file that cannot be told, and counts as live."""
-    locks = locks_of(path)
-    return not locks or any(map(is_locked, locks))
+        # A process holds a lock beside its files; without a lock file that cannot be told.
+        locks = locks_of(path)
+        is_live = not locks or any(map(is_locked, locks))
+        yield ShmFile(path.name, status.st_size, status.st_uid, _user(status.st_uid), is_live, port)
 
 
 def _user(uid: int) -> str:
