@@ -22,7 +22,7 @@ def main() -> None:
     """Run the demo and draw the moment that shows most."""
     prepare_ros()
     moments: list[Moment] = []
-    relay_rig(nullcontext(moments.append), total_s=_SECONDS, seed=0, stop=StopRequest())
+    relay_rig(nullcontext(moments.append), total_s=_SECONDS, seed=1, stop=StopRequest())
     settled = [moment for moment in moments if moment.elapsed_s > _SETTLED_S]
     healthy = [moment for moment in settled if not any(group.problems for group in moment.state.groups)]
     draw(frame(max(healthy or settled, key=_shows_a_lost_set), width=COLUMNS, height=LINES), _PICTURE)
