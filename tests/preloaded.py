@@ -241,6 +241,7 @@ def main() -> None:
     gc.freeze()
     # LTTng's two threads are the only ones.
     warnings.filterwarnings("ignore", category=DeprecationWarning, message=".*multi-threaded, use of fork")
+    _keep_tracing()
     with socket.socket(fileno=int(listening_at)) as listening:
         request, streams = _served(listening)
     if request is not None:
@@ -275,7 +276,6 @@ def _served(listening: socket.socket) -> tuple[dict[str, Any] | None, Sequence[i
     Returns the request and its streams in a fork, None in the server once its stdin has ended.
     """
     forks: dict[int, tuple[int, socket.socket]] = {}
-    tracing = _Tracing()
     with selectors.DefaultSelector() as selector:
         selector.register(sys.stdin.fileno(), selectors.EVENT_READ)
         selector.register(listening, selectors.EVENT_READ)
@@ -290,7 +290,7 @@ def _served(listening: socket.socket) -> tuple[dict[str, Any] | None, Sequence[i
                     return None, ()
                 connection, _ = listening.accept()
                 text, streams, _, _ = socket.recv_fds(connection, _LONGEST_REQUEST, 3)
-                if not (pid := tracing.fork()):
+                if not (pid := os.fork()):
                     for fd, (_, other) in forks.items():
                         os.close(fd)
                         other.close()
@@ -334,28 +334,19 @@ def _run(request: Mapping[str, Any], streams: Sequence[int]) -> int | None:
     return code
 
 
-class _Tracing:
-    """Forks with LTTng, which comes with rclpy: at its end it waits for two threads that only its hooks restart.
+def _keep_tracing() -> None:
+    """Call LTTng's hooks at each fork, as its own wrapper of fork() does; LTTng comes with rclpy.
 
-    LTTng's wrapper of fork() calls the same hooks. Each takes room for a signal mask.
+    At its end it waits for two threads that only the hooks restart. Each hook takes room for a signal mask.
     """
-
-    def __init__(self) -> None:
-        maps = (line.split(maxsplit=5) for line in Path("/proc/self/maps").read_text().splitlines())
-        found = {path for *_, path in maps if re.search(r"/liblttng-ust(-[0-9a-f]+)?\.so", path)}
-        self._libraries = [ctypes.CDLL(path) for path in found]
-        self._masks = [ctypes.create_string_buffer(128) for _ in found]
-
-    def fork(self) -> int:
-        """As os.fork."""
-        self._call("before_fork")
-        pid = os.fork()
-        self._call("after_fork_parent" if pid else "after_fork_child")
-        return pid
-
-    def _call(self, moment: str) -> None:
-        for library, mask in zip(self._libraries, self._masks, strict=True):
-            getattr(library, f"ust_{moment}")(mask)
+    maps = (line.split(maxsplit=5) for line in Path("/proc/self/maps").read_text().splitlines())
+    for found in {path for *_, path in maps if re.search(r"/liblttng-ust(-[0-9a-f]+)?\.so", path)}:
+        library, mask = ctypes.CDLL(found), ctypes.create_string_buffer(128)
+        os.register_at_fork(
+            before=functools.partial(library.ust_before_fork, mask),
+            after_in_parent=functools.partial(library.ust_after_fork_parent, mask),
+            after_in_child=functools.partial(library.ust_after_fork_child, mask),
+        )
 
 
 if __name__ == "__main__":

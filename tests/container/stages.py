@@ -1,15 +1,23 @@
-"""Where players and collectors run: on the host, or in containers of the same image."""
+"""Where players and collectors run, on the host or in containers, and the sets that a relay elsewhere must publish."""
 
 import subprocess
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from syncrelay.sync import ExactTime
 from tests.container.docker import HOST, IMAGE, Network
+from tests.ros import relaying
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import LOSSLESS, config, inputs, outputs
 from tests.ros.processes import Process
-from tests.ros.stage import Stage, running_stage
+from tests.ros.stage import Player, Stage, running_stage
+from tests.ros.streams import at, merged
 
 _TESTS = Path(__file__).parents[1]
+PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
+FRONT = {"policy": "exact_time", "topics": inputs(PAIR, qos=LOSSLESS)}
+CONFIG = config({"front": FRONT})
 
 
 @contextmanager
@@ -52,3 +60,24 @@ class ContainerStage(Stage):
             self.image,
         ]
         return super().start(name, [*docker_run, *argv[1:]], stdin=stdin)
+
+
+def assert_relayed(stage: Stage, topics: dict[str, str] | None = None, group: str = "front") -> Player:
+    """Play on this stage and assert that a relay elsewhere publishes exactly the 20 expected sets.
+
+    Every type of the topics must have the fields of VECTOR. Returns the player, which still runs.
+    """
+    topics = topics or PAIR
+    first, second = topics
+    played = merged(at(first, *range(0, 1000, 25)), at(second, *range(0, 1000, 50)))
+    recording = [frame._replace(type_name=topics[frame.topic]) for frame in played]
+    aligned = dict(zip(outputs(group, topics), topics.values(), strict=True))
+    collector = stage.collector(aligned)
+    player = stage.player(topics)
+    relaying.connect(player, collector, recording, aligned)
+    player.play(recording)
+    relaying.conclude(player, collector, recording, aligned)
+    expected = relaying.expected_sets(ExactTime(n_inputs=2, queue_size=10), recording, list(topics))
+    assert len(expected) == 20
+    assert relaying.sets_within(recording, collector, aligned) == expected
+    return player

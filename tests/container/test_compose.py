@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.container.docker import Container, docker, run_docker
-from tests.container.sets import CONFIG, FRONT, assert_relayed
+from tests.container.stages import CONFIG, FRONT, assert_relayed
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import LOSSLESS, config, inputs
 from tests.ros.processes import wait_until

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.container.docker import WITH_MESSAGES, docker, run_docker
-from tests.container.sets import assert_relayed
+from tests.container.stages import assert_relayed
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import LOSSLESS, config, inputs
 

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.container.docker import HARDENED
-from tests.container.sets import CONFIG, assert_relayed
+from tests.container.stages import CONFIG, assert_relayed
 
 pytestmark = pytest.mark.container
 

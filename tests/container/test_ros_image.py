@@ -4,7 +4,7 @@ import pytest
 
 from syncrelay.ros.compiled import source_fingerprint
 from tests.container.docker import HARDENED, ON_ROS, PROBED_EVERY_SECOND, docker
-from tests.container.sets import CONFIG, assert_relayed
+from tests.container.stages import CONFIG, assert_relayed
 
 pytestmark = pytest.mark.container
 
