@@ -60,28 +60,24 @@ def relay_with(tmp_path):
     return run
 
 
-def test_without_rclpy_the_relay_names_both_ways_to_it(relay_with):
-    run = relay_with(_BASE)
+@pytest.mark.parametrize(
+    ("packages", "environ", "said"),
+    [
+        (_BASE, {}, ["rclpy is not installed", "pip install '.[ros]'", "source /opt/ros"]),
+        (_BASE, {"ROS_DISTRO": "jazzy"}, ["ROS 2 jazzy is sourced, but Python", "--system-site-packages"]),
+        pytest.param(
+            [*_BASE, *_RCLPY],
+            {},
+            ["rclpy is installed but cannot be imported: lib", "middleware"],
+            marks=pytest.mark.ros,
+        ),
+    ],
+    ids=["no rclpy", "a ROS for another Python", "no middleware"],
+)
+def test_what_is_missing_is_named_with_the_ways_to_it(relay_with, packages, environ, said):
+    run = relay_with(packages, **environ)
     assert run.returncode == 69
-    assert "rclpy is not installed" in run.stderr
-    assert "pip install '.[ros]'" in run.stderr
-    assert "source /opt/ros" in run.stderr
-    assert "Traceback" not in run.stderr
-
-
-def test_a_sourced_ros_for_another_python_is_named(relay_with):
-    run = relay_with(_BASE, ROS_DISTRO="jazzy")
-    assert run.returncode == 69
-    assert "ROS 2 jazzy is sourced, but Python" in run.stderr
-    assert "--system-site-packages" in run.stderr
-
-
-@pytest.mark.ros
-def test_rclpy_without_its_middleware_is_told_from_no_rclpy(relay_with):
-    run = relay_with([*_BASE, *_RCLPY])
-    assert run.returncode == 69
-    assert "rclpy is installed but cannot be imported: lib" in run.stderr
-    assert "middleware" in run.stderr
+    assert [words for words in said if words not in run.stderr] == []
     assert "Traceback" not in run.stderr
 
 

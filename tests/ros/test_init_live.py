@@ -115,33 +115,9 @@ def test_topics_without_stamps_are_named_with_the_reason(stage: Stage):
     assert int(unset.split("messages, ")[1].split()[0]) > 0
 
 
-def test_a_file_that_is_there_is_left_alone(stage: Stage):
-    player = stage.player({"/left": VECTOR, "/right": VECTOR})
-    player.is_up()
-    player.start(merged(_now("/left", period_ms=50), _now("/right", period_ms=50)), speed=1)
-    taken = stage.folder / "taken.yaml"
-    taken.write_text("mine")
-    for seconds in LOOKS_S:
-        done = _init(stage, "--seconds", f"{seconds}", "-o", str(taken))
-        if "already exists" in done.stderr:
-            break
-    assert (done.returncode, taken.read_text()) == (1, "mine")
-    assert ours_of(done.stderr) == [f"syncrelay: {taken}: already exists and is not overwritten"]
-
-
 def test_it_can_be_stopped_while_it_listens(stage: Stage):
     player = stage.player({"/left": VECTOR})
     process = stage.start("init", [sys.executable, "-m", "syncrelay", "init", "--from-graph", "--seconds", "600"])
     player.match()
     process.send(signal.SIGINT)
     assert (process.wait(), process.stdout) == (130, "")
-
-
-def test_without_ros_the_way_to_it_is_said(tmp_path: Path):
-    # A module of this name that cannot be imported stands for a ROS that is broken or not there.
-    (tmp_path / "rclpy.py").write_text("raise ImportError('no such middleware')")
-    code = "import sys; sys.path.insert(0, sys.argv[1]); from syncrelay.cli import main; sys.exit(main(sys.argv[2:]))"
-    argv = [sys.executable, "-c", code, str(tmp_path), "init", "--from-graph"]
-    done = subprocess.run(argv, capture_output=True, text=True, timeout=120, check=False)
-    assert (done.returncode, done.stdout) == (69, "")
-    assert "no such middleware" in done.stderr
