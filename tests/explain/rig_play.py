@@ -7,7 +7,9 @@ relay stands still for a while. Seconds are those after the start of the relay.
 
 import math
 import random
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -15,7 +17,7 @@ from syncrelay.explain import Endpoint, Mismatch, Standstill
 from tests.explain.scenario import BEGAN, S, Source, Told, run
 from tests.scenarios.play import ACT_S
 from tests.scenarios.rigs import Scenario, cure_in, group_of, placed, write
-from tests.scenarios.streams import Stream
+from tests.scenarios.streams import Sampler, Stream
 
 LONGEST_ACT_S = 75.0
 _LONGEST_PLAY_S = 1000.0
@@ -147,49 +149,32 @@ class Play:
         return tuple(each.endpoint for each in self.shown if each.topic == topic and each.begin <= second < each.end)
 
     def sources(self) -> list[Source]:
-        topics = [row["topic"] for row in self.group["topics"]]
-        sending = {topic: [each for each in self._streams if each.topic == topic and each.hz] for topic in topics}
-        return [
-            source
-            for topic in topics
-            for source in [self._source(each) for each in sending[topic]]
-            or [Source(topic, 1, sends=lambda _: False, topic_options=self._options(topic))]
-        ]
+        """A source for each stream that sends, or one that sends nothing."""
+        found = []
+        for row in self.group["topics"]:
+            options = {key: value for key, value in row.items() if key != "topic"}
+            streams = [each for each in self._streams if each.topic == row["topic"] and each.hz]
+            messages: list[Callable[[], Iterable[tuple[float, int | None]]]]
+            messages = [partial(self._messages, each) for each in streams] or [tuple]
+            found += [Source(row["topic"], hz=1, messages=each, topic_options=options) for each in messages]
+        return found
 
-    def _options(self, topic: str) -> dict[str, Any]:
-        return {key: value for key, value in self.rows[topic].items() if key != "topic"}
-
-    def _source(self, stream: Stream) -> Source:
+    def _messages(self, stream: Stream) -> Iterator[tuple[float, int | None]]:
+        """Yield when each message of a stream is received, and its stamp."""
         spans, begins = self._sending.get(stream, []), self.moments.begins
         is_held = stream.durability == "transient_local"
-        fits = self.rows[stream.topic]["type"] == stream.type and not self._is_unfit(stream.topic, stream.reliability)
-
-        def received(at: float) -> float:
-            if stream.batch_ms:
-                at = begins + math.ceil((at - begins) * 1000 / stream.batch_ms) * stream.batch_ms / 1000
-            return max(at, spans[0][0]) if is_held else at
-
-        def sends(at: float) -> bool:
-            sent = received(at + stream.late_ms / 1000)
-            return fits and (is_held or any(begin <= sent < end for begin, end in spans))
-
-        return Source(
-            stream.topic,
-            stream.hz,
-            delay_ms=stream.late_ms,
-            jitter_ms=stream.wobble_ms / math.sqrt(3),
-            delay_jitter_ms=stream.jitter_ms / math.sqrt(3),
-            phase_ms=begins * 1000 + stream.phase_ms,
-            topic_options=self._options(stream.topic),
-            clock=lambda at: (
-                stream.shift_ms / 1000
-                + (at - begins) * stream.ppm / 1e6
-                - (_BOOTED_AT_S if stream.clock == "boot" else 0)
-            ),
-            stamp=lambda ns: _stamped(stream, ns, begins + stream.phase_ms / 1000),
-            sends=sends,
-            received=received,
-        )
+        if self.rows[stream.topic]["type"] != stream.type or self._is_unfit(stream.topic, stream.reliability):
+            return
+        zero = BEGAN + round(begins * S) - (_BOOTED_AT_S * S if stream.clock == "boot" else 0)
+        sampler, at = Sampler(stream, seed=self.moments.seed), begins
+        while at < self.moments.acts[2][2]:
+            sent, _, stamp = sampler.next()
+            at = begins + sent
+            ns = {"zero": 0, "none": None}.get(stream.clock, zero + round(stamp * S))
+            if is_held:
+                yield max(at, spans[0][0]), ns
+            elif any(begin <= at < end for begin, end in spans):
+                yield at, ns
 
     def _is_unfit(self, topic: str, reliability: str) -> bool:
         """Whether DDS does not connect a publisher to the group."""
@@ -222,15 +207,6 @@ class Play:
 
     def is_missing_at(self, second: float) -> bool:
         return any(not self.publishers(topic, second) for topic in self.rows)
-
-
-def _stamped(stream: Stream, ns: int, first: float) -> int | None:
-    if stream.clock in ("zero", "none"):
-        return 0 if stream.clock == "zero" else None
-    if stream.repeat == 1:
-        return ns
-    zero, grid = BEGAN + round(first * S), round(stream.repeat / stream.hz * S)
-    return zero + (ns - zero + 1000) // grid * grid
 
 
 class Played(NamedTuple):

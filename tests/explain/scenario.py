@@ -7,7 +7,7 @@ Seconds are those after the start; a source's message of second 1 has the stamp 
 """
 
 import random
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from heapq import merge
 from typing import Any, TypedDict
@@ -52,7 +52,8 @@ class _SourceFaults:
 
     `clock` is by how many seconds its stamps are ahead of the machine's clock; `stamp` makes the whole stamp, in
     nanoseconds, from the one that there would be. `sends` says whether a message is sent at all, `hz_at` its rate.
-    `received` is when a message arrives that would arrive at that second: later where something holds it up.
+    `received` is when a message arrives that would arrive at that second: later where something holds it up. In place
+    of all that, `messages` gives when each is received, in seconds, and its stamp; None of one that is cut short.
     """
 
     clock: Callable[[float], float] = nothing
@@ -60,6 +61,7 @@ class _SourceFaults:
     sends: Callable[[float], bool] = always
     hz_at: Callable[[float], float] | None = None
     received: Callable[[float], float] | None = None
+    messages: Callable[[], Iterable[tuple[float, int | None]]] | None = None
 
 
 @dataclass(frozen=True)
@@ -237,6 +239,9 @@ def _arrivals(
 ) -> Iterator[tuple[float, int, int | None]]:
     """Yield when each message is received, its input and its stamp, in the order of receipt."""
     index = names.index(source.topic)
+    if source.messages is not None:
+        yield from ((at, index, stamp) for at, stamp in source.messages())
+        return
     second, last = source.phase_ms / 1000, 0.0
     while second < seconds:
         if source.sends(second):

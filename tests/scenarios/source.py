@@ -4,9 +4,7 @@ Each line of stdin is the number of an act, which begins at once. It ends when s
 """
 
 import heapq
-import math
 import os
-import random
 import select
 import sys
 import time
@@ -21,7 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from tests.ros.cdr_messages import vector
 from tests.ros.message_types import import_type
-from tests.scenarios.streams import Stream, from_json
+from tests.scenarios.streams import Sampler, Stream, from_json
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -31,31 +29,6 @@ _LONGEST_SLEEP_S = 0.1
 _LOST_S = 0.1
 # One that did not get it for so long says so.
 _STALLED_S = 0.25
-
-
-class _Sampler:
-    """The samples of one stream, one after another; times are seconds after the play began."""
-
-    def __init__(self, stream: Stream, *, now: float) -> None:
-        self.stream = stream
-        self._chance = random.Random(stream.topic)
-        self._number = max(0, math.ceil(now * stream.hz))
-        self._sent = now
-        self._stamp = 0.0
-
-    def next(self) -> tuple[float, float, float]:
-        """When to send the next message, when its sample was taken, and its stamp in seconds of the play."""
-        stream, chance = self.stream, self._chance
-        sampled = self._number / stream.hz + stream.phase_ms / 1000
-        sampled += chance.uniform(-stream.wobble_ms, stream.wobble_ms) / 1000
-        sent = sampled + (stream.late_ms + chance.uniform(-stream.jitter_ms, stream.jitter_ms)) / 1000
-        if stream.batch_ms:
-            sent = math.ceil(sent * 1000 / stream.batch_ms) * stream.batch_ms / 1000
-        if self._number % stream.repeat == 0:
-            self._stamp = sampled + sampled * stream.ppm / 1e6 + stream.shift_ms / 1000
-        self._number += 1
-        self._sent = max(sent, self._sent)
-        return self._sent, sampled, self._stamp
 
 
 class _Graph:
@@ -100,7 +73,7 @@ class _Source:
     def __init__(self, streams: Sequence[Stream]) -> None:
         self._streams = streams
         self._graph = _Graph()
-        self._samplers: dict[Stream, _Sampler] = {}
+        self._samplers: dict[Stream, Sampler] = {}
         self._due: list[tuple[float, float, int, Stream, float]] = []
         self._count = 0
         self._began = 0.0
@@ -119,7 +92,7 @@ class _Source:
         self._due = [entry for entry in self._due if entry[3] not in ended]
         heapq.heapify(self._due)
         kept = {stream: sampler for stream, sampler in self._samplers.items() if stream not in ended}
-        self._samplers = {stream: kept.get(stream) or _Sampler(stream, now=now) for stream in active if stream.hz}
+        self._samplers = {stream: kept.get(stream) or Sampler(stream, now=now) for stream in active if stream.hz}
         for stream in self._samplers.keys() - kept.keys():
             self._push(stream)
 

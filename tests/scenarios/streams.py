@@ -1,6 +1,8 @@
 """What the sensors of a scenario send: one row for each stream, as a value that travels to the source as JSON."""
 
 import json
+import math
+import random
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TypedDict
@@ -52,6 +54,31 @@ class Stream:
     def driver(self) -> str:
         """The name of the node that sends it."""
         return self.node or f"{self.topic.rpartition('/')[2]}_driver"
+
+
+class Sampler:
+    """The samples of one stream, one after another; times are seconds after the play began."""
+
+    def __init__(self, stream: Stream, *, now: float = 0.0, seed: int = 0) -> None:
+        self.stream = stream
+        self._chance = random.Random(f"{seed} {stream.topic}")
+        self._number = max(0, math.ceil(now * stream.hz))
+        self._sent = now
+        self._stamp = 0.0
+
+    def next(self) -> tuple[float, float, float]:
+        """When to send the next message, when its sample was taken, and its stamp in seconds of the play."""
+        stream, chance = self.stream, self._chance
+        sampled = self._number / stream.hz + stream.phase_ms / 1000
+        sampled += chance.uniform(-stream.wobble_ms, stream.wobble_ms) / 1000
+        sent = sampled + (stream.late_ms + chance.uniform(-stream.jitter_ms, stream.jitter_ms)) / 1000
+        if stream.batch_ms:
+            sent = math.ceil(sent * 1000 / stream.batch_ms) * stream.batch_ms / 1000
+        if self._number % stream.repeat == 0:
+            self._stamp = sampled + sampled * stream.ppm / 1e6 + stream.shift_ms / 1000
+        self._number += 1
+        self._sent = max(sent, self._sent)
+        return self._sent, sampled, self._stamp
 
 
 def as_json(streams: Sequence[Stream]) -> str:
