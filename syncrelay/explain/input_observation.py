@@ -9,7 +9,8 @@ from typing import Final, NamedTuple, TypeAlias
 from syncrelay.explain.clocks import Drift, StampSteps, drift
 from syncrelay.explain.distribution import Distribution, keep_last, no_values
 from syncrelay.explain.figures import InputFigures
-from syncrelay.explain.rhythm import AT_ONCE, LEAST_HELD_NS, Burst, Pace, bursts, steady_period
+from syncrelay.explain.rhythm import AT_ONCE, LEAST_HELD_NS, Burst, PaceWatch, bursts, steady_period
+from syncrelay.explain.standing import Pace
 from syncrelay.sync.messages import DropReason
 
 Arrivals: TypeAlias = Sequence[tuple[int, int]]
@@ -50,7 +51,7 @@ class InputObservation:
         self._received = no_values()
         self._first: int | None = None
         self._flows_since: int | None = None
-        self._pace = Pace()
+        self._pace = PaceWatch()
         self._paced = no_values()
         self._nearest = no_values()
         self._delays = no_values()
@@ -93,7 +94,7 @@ class InputObservation:
         delays = list(map(sub, map(by_clock, received) if by_clock else received, stamps)) if stamped else []
         least, most = (min(delays), max(delays)) if delays else (0, 0)
         if delays:
-            self._steps.add(received, delays, least, most, period=self._period)
+            self._steps.add(received, delays, least, most, period=lambda: _median_period(self._received))
         # Of two clocks in turn, each fall is followed by a rise: nothing begins anew.
         if fallen and not self._steps.swings(last)[0]:
             self._forget()
@@ -139,25 +140,14 @@ class InputObservation:
         return self._pace.slowed_from
 
     @property
-    def first(self) -> int | None:
-        """When its first message was received."""
-        return self._first
-
-    @property
-    def last(self) -> int | None:
-        """When its last message was received, None also where a clock jumped since."""
-        return self._received[-1] if self._received else None
-
-    @property
-    def steady_period(self) -> float | None:
-        """How long after each other its messages are received while they come, None if they have no steady pace."""
-        return steady_period(self._paced)
+    def pace(self) -> Pace:
+        """When the first and the last message came, and how steadily; without a last one where a clock jumped since."""
+        return Pace(self._first, self._received[-1] if self._received else None, steady_period(self._paced))
 
     @property
     def period(self) -> float:
         """The median of its last periods, by its stamps; 0 of too few to tell, and of stamps that mostly fall."""
-        last = self._stamps[-_PERIODS:]
-        return max(0.0, median(map(sub, last[1:], last))) if len(last) > 1 else 0.0
+        return max(0.0, _median_period(self._stamps))
 
     def add_nearest(self, spans: Sequence[int]) -> None:
         """Take the spans of the tightest sets with this input."""
@@ -237,11 +227,6 @@ class InputObservation:
         self._newest = newest
         return duplicates, out_of_order, fallen
 
-    def _period(self) -> float:
-        """Give the median of the last periods, 0 of too few."""
-        last = self._received[-_PERIODS:]
-        return median(map(sub, last[1:], last)) if len(last) > 1 else 0.0
-
     def _measure(self, stamped: Arrivals, delays: Sequence[int], least: int, most: int) -> None:
         """Measure drift and bursts, from messages that have stamps."""
         self._find_bursts(stamped, delays, least, most)
@@ -284,3 +269,9 @@ class InputObservation:
             # It began within the window and has not had all of it.
             return (fed - 1) * _SECOND / (times[-1] - self._first), usual
         return fed / seconds, usual
+
+
+def _median_period(times: Sequence[int]) -> float:
+    """Return the median of the last periods, 0 of too few."""
+    last = times[-_PERIODS:]
+    return median(map(sub, last[1:], last)) if len(last) > 1 else 0.0

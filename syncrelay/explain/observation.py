@@ -12,7 +12,7 @@ from syncrelay.explain.distribution import Distribution, Tallied, keep_last, no_
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.input_observation import WINDOW_NS, Arrivals, InputObservation
 from syncrelay.explain.nearest import NearestSpans
-from syncrelay.explain.standing import Pace, ShareWindow
+from syncrelay.explain.standing import ShareWindow
 from syncrelay.sync.counts import InputCounts
 
 SentSets: TypeAlias = Sequence[tuple[tuple[int | None, ...], int]]
@@ -57,7 +57,7 @@ class Observation:
         self._measured = [index for index in self._required if index not in apart]
         self._trigger = trigger
         self._ticks_hz = ticks_hz
-        self._inputs = [InputObservation() for _ in offsets_ns]
+        self.inputs = [InputObservation() for _ in offsets_ns]
         nothing = tuple(InputCounts(fed=0, matched=0, dropped={}, buffered=0) for _ in offsets_ns)
         self._polls = deque([_Poll(began, nothing, 0, 0, (0,) * len(nothing))])
         self._share = ShareWindow(
@@ -94,18 +94,17 @@ class Observation:
         """Take what came and left since the last call, and the engine's counts as they are now."""
         if self._polls and now < self._polls[-1].at:
             self._begin_anew(now)
-        stamps = list(zip(*(stamps for stamps, _ in sets), strict=True)) or [()] * len(self._inputs)
+        stamps = list(zip(*(stamps for stamps, _ in sets), strict=True)) or [()] * len(self.inputs)
         missing = tuple([each.count(None) for each in stamps])
         self._polls.append(_Poll(now, tuple(counts), total_sets, len(sets), missing))
-        if len(self._required) < len(self._inputs):
+        if len(self._required) < len(self.inputs):
             self._sets_since_without = list(map(_since_without, self._sets_since_without, stamps))
         while len(self._polls) > 1 and self._polls[1].at <= now - WINDOW_NS:
             self._polls.popleft()
-        fallen = [each.add(new, by_clock=by_clock) for each, new in zip(self._inputs, arrivals, strict=True)]
-        paces = [each.slowed_from_hz for each in self._inputs]
+        fallen = [each.add(new, by_clock=by_clock) for each, new in zip(self.inputs, arrivals, strict=True)]
+        paces = [each.slowed_from_hz for each in self.inputs]
         clock = None if by_clock is None else by_clock(now)
-        steady = [Pace(each.first, each.last, each.steady_period) for each in self._inputs]
-        self._share.add(counts, total_sets, steady, now=now, clock=clock)
+        self._share.add(counts, total_sets, [each.pace for each in self.inputs], now=now, clock=clock)
         if paces != self._paces:
             # What was measured before says nothing of how it is now.
             self._paces = paces
@@ -117,7 +116,7 @@ class Observation:
 
     def figures(self, *, now: int) -> tuple[GroupFigures, tuple[InputFigures, ...]]:
         """Give what is known now, of the group and of its inputs in order."""
-        inputs = tuple(self._input_figures(index, now) for index in range(len(self._inputs)))
+        inputs = tuple(self._input_figures(index, now) for index in range(len(self.inputs)))
         counted = self._required if self._trigger is None else [self._trigger]
         group = GroupFigures(
             now=now,
@@ -144,20 +143,12 @@ class Observation:
         """Bear that nothing was fed for a while, until now: what came before tells nothing. What left is kept."""
         self._began, self._last_set, self._resumed = at, None, None
         self._polls = deque(poll._replace(at=at, sent=0) for poll in [*self._polls][-1:])
-        self._inputs = [InputObservation() for _ in self._inputs]
+        self.inputs = [InputObservation() for _ in self.inputs]
         self._share.clear()
-        self._paces = [None] * len(self._inputs)
-        self._sets_since_without = [0] * len(self._inputs)
+        self._paces = [None] * len(self.inputs)
+        self._sets_since_without = [0] * len(self.inputs)
         self._forget_nearest()
         self._clear_nearest_spans()
-
-    def forget_publishers(self, index: int) -> None:
-        """Bear that others publish an input now than did."""
-        self._inputs[index].forget_publishers()
-
-    def forget_clock(self, index: int) -> None:
-        """Bear that an input is published anew: by the same node, maybe, maybe not by the same clock."""
-        self._inputs[index].forget_clock()
 
     def begin_sets_anew(self, now: int) -> None:
         """Bear that sets may leave again, which could not: their rate is that from now on."""
@@ -165,7 +156,7 @@ class Observation:
 
     def recent(self) -> Sequence[Arrivals]:
         """Give the last messages of each input that have stamps, to try values on."""
-        return [each.recent() for each in self._inputs]
+        return [each.recent() for each in self.inputs]
 
     def _begin_anew(self, now: int) -> None:
         """Forget what lies in the future after this machine's clock was set back: it would count forever."""
@@ -206,12 +197,12 @@ class Observation:
         for optional, spans in self._with_optional.items():
             among = [*self._required, optional]
             pivot = among.index(self._slowest(among))
-            self._inputs[optional].add_nearest(spans.add([shifted[index] for index in among], pivot=pivot))
+            self.inputs[optional].add_nearest(spans.add([shifted[index] for index in among], pivot=pivot))
 
     def _slowest(self, among: Sequence[int]) -> int:
         """Give the input of these of which the fewest came in the window, of those that do not come faster by far."""
         # Few came of one that has just begun, or is back, however fast it comes.
-        periods = {index: self._inputs[index].period for index in among}
+        periods = {index: self.inputs[index].period for index in among}
         longest = max(periods.values())
         among = [index for index, period in periods.items() if not period or period > _AS_SLOW * longest]
         last = self._polls[-1].counts
@@ -251,11 +242,11 @@ class Observation:
         return (last.sets - first.sets) * _SECOND / max(1, last.at - first.at)
 
     def _missing(self, now: int) -> tuple[float, ...]:
-        if len(self._required) == len(self._inputs):
-            return (0.0,) * len(self._inputs)
+        if len(self._required) == len(self.inputs):
+            return (0.0,) * len(self.inputs)
         recent = [poll for poll in self._polls if poll.at > now - WINDOW_NS]
         sent = max(1, sum(poll.sent for poll in recent))
-        return tuple(sum(poll.missing[index] for poll in recent) / sent for index in range(len(self._inputs)))
+        return tuple(sum(poll.missing[index] for poll in recent) / sent for index in range(len(self.inputs)))
 
     def _input_figures(self, index: int, now: int) -> InputFigures:
         if not self._polls:
@@ -263,7 +254,7 @@ class Observation:
         before, after = self._polls[0].counts[index], self._polls[-1].counts[index]
         gone = {reason: count - before.dropped.get(reason, 0) for reason, count in after.dropped.items()}
         seconds = (self._polls[-1].at - self._polls[0].at) / _SECOND
-        return self._inputs[index].figures(
+        return self.inputs[index].figures(
             fed=after.fed - before.fed, dropped={reason: n for reason, n in gone.items() if n}, seconds=seconds, now=now
         )
 

@@ -76,7 +76,7 @@ def steady_period(received: Sequence[int]) -> float | None:
     return sum(near) / len(near) if 2 * len(near) > len(periods) else None
 
 
-class Pace:
+class PaceWatch:
     """The pace of one input, poll by poll. Remembers a steady one while the input is slower than that."""
 
     def __init__(self) -> None:

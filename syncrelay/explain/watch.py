@@ -194,7 +194,8 @@ class GroupWatch:
                 self._served_since[index] = None
             elif since is None:
                 self._served_since[index] = now
-                self._observation.forget_clock(index)
+                # By the same node, maybe, maybe not by the same clock.
+                self._observation.inputs[index].forget_clock()
             elif since > now:
                 # This machine's clock was set back.
                 self._served_since[index] = now
@@ -205,5 +206,5 @@ class GroupWatch:
             count = len(shown.publishers)
             if count and count != self._publishers[index]:
                 if self._publishers[index]:
-                    self._observation.forget_publishers(index)
+                    self._observation.inputs[index].forget_publishers()
                 self._publishers[index] = count

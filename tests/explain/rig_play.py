@@ -102,10 +102,6 @@ def any_moments(seed: str) -> Moments:
     )
 
 
-def _key(stream: Stream) -> tuple[str, ...]:
-    return stream.driver, stream.topic, stream.type, stream.reliability, stream.durability
-
-
 class Play:
     """A scenario at its moments."""
 
@@ -123,19 +119,19 @@ class Play:
         n = 0
         for act, begin, end in self.moments.acts:
             active = [each for each in self._streams if act in each.acts]
-            for key in sorted(since.keys() - {_key(each) for each in active}):
+            for key in sorted(since.keys() - {each.publisher for each in active}):
                 self._end(key, since.pop(key)[0], begin + self.moments.drops[n])
                 n += 1
             for each in active:
-                if _key(each) not in since:
+                if each.publisher not in since:
                     lead, first = self.moments.leads[n], max(0.0, begin) + 0.1
                     n += 1
-                    since[_key(each)] = first + max(0.0, -lead), first + max(0.0, lead)
+                    since[each.publisher] = first + max(0.0, -lead), first + max(0.0, lead)
                 spans = self._sending.setdefault(each, [])
                 if spans and spans[-1][1] == begin:
                     spans[-1] = spans[-1][0], end
                 else:
-                    spans.append((max(begin, since[_key(each)][1]), end))
+                    spans.append((max(begin, since[each.publisher][1]), end))
         for key, (found, _) in since.items():
             self._end(key, found, math.inf)
 

@@ -199,14 +199,6 @@ def test_an_input_whose_rate_varies_has_none_to_fall_from():
     assert stage.inputs[0].slowed_from_hz is None
 
 
-def test_the_nearest_sets_with_an_optional_input_are_measured_whenever_it_comes():
-    stage = Stage(3, required=[True, True, False])
-    for _ in range(10):
-        stage.second(stage.stream(10), stage.stream(10, shift=4 * MS), stage.stream(10, shift=-30 * MS, delay=500 * MS))
-    assert set(stage.inputs[2].nearest.values) == {34 * MS}
-    assert not len(stage.inputs[0].nearest)
-
-
 def a_set(stage, *, span=5 * MS, latency=MS, second=True):
     return (stage.now, stage.now + span if second else None), latency
 
@@ -342,7 +334,7 @@ def test_memory_does_not_grow_with_time():
     def held():
         observation = stage.observation
         kept: list[Any] = [observation._polls, observation._spans, observation._latencies, observation._nearest]  # noqa: SLF001  memory is the promise
-        for each in observation._inputs:  # noqa: SLF001
+        for each in observation.inputs:
             kept += [each._stamps, each._received, each._delays, each._faults, each._points]  # noqa: SLF001
         return sum(map(len, kept))
 

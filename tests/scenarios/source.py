@@ -40,7 +40,7 @@ class _Graph:
 
     def change(self, streams: Sequence[Stream]) -> None:
         """Let there be the publishers of these streams and no other."""
-        wanted = {_key(stream): stream for stream in streams}
+        wanted = {stream.publisher: stream for stream in streams}
         for key in self._publishers.keys() - wanted.keys():
             self._nodes[key[0]].destroy_publisher(self._publishers.pop(key))
         for name in self._nodes.keys() - {stream.driver for stream in streams}:
@@ -49,7 +49,7 @@ class _Graph:
             self._publishers[key] = self._publisher(wanted[key])
 
     def publisher(self, stream: Stream) -> Publisher:
-        return self._publishers[_key(stream)]
+        return self._publishers[stream.publisher]
 
     def _publisher(self, stream: Stream) -> Publisher:
         profile = QoSProfile(
@@ -63,10 +63,6 @@ class _Graph:
                 name, namespace=namespace, start_parameter_services=False, enable_rosout=False
             )
         return self._nodes[stream.driver].create_publisher(import_type(stream.type), stream.topic, profile)
-
-
-def _key(stream: Stream) -> tuple[str, ...]:
-    return stream.driver, stream.topic, stream.type, stream.reliability, stream.durability
 
 
 class _Source:

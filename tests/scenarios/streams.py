@@ -55,6 +55,11 @@ class Stream:
         """The name of the node that sends it."""
         return self.node or f"{self.topic.rpartition('/')[2]}_driver"
 
+    @property
+    def publisher(self) -> tuple[str, ...]:
+        """What two streams of one publisher have in common."""
+        return self.driver, self.topic, self.type, self.reliability, self.durability
+
 
 class Sampler:
     """The samples of one stream, one after another; times are seconds after the play began."""
