@@ -2,12 +2,12 @@
 
 from bisect import bisect_left
 from collections import deque
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from itertools import repeat
 from operator import add, sub
 from typing import Any, Final, NamedTuple, TypeAlias
 
-from syncrelay.config import Distance
+from syncrelay.config import Distance, GroupConfig
 from syncrelay.explain.distribution import Distribution, Tallied, keep_last, no_values
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.input_observation import WINDOW_NS, Arrivals, InputObservation
@@ -29,43 +29,26 @@ _AS_SLOW: Final = 0.7
 
 
 class Observation:
-    """Gathers what came and left of one group.
+    """Gathers what came and left of one group; all times are of one clock, that of `began` and of times of receipt."""
 
-    `offsets_ns` are added to stamps as for matching; `distance` is how it is measured how far apart messages are;
-    `trigger` is the index of the input whose every message makes a set; `ticks_hz` is the rate of the clock that does,
-    where one does. How near the messages of the inputs `apart` are is not measured: they have tolerances of their own.
-    `every` and `least_period` are how sets are thinned. All times are of one clock, that of `began` and of the times of
-    receipt.
-    """
-
-    def __init__(
-        self,
-        *,
-        offsets_ns: Sequence[int],
-        required: Sequence[bool],
-        began: int,
-        distance: Distance = Distance.SPAN,
-        trigger: int | None = None,
-        ticks_hz: float | None = None,
-        apart: Collection[int] = (),
-        every: int = 1,
-        least_period: int | None = None,
-    ) -> None:
+    def __init__(self, config: GroupConfig, *, began: int) -> None:
+        options, distance = config.options, config.options.distance
         self._began = began
-        self._offsets = tuple(offsets_ns)
-        self._required = [index for index, needed in enumerate(required) if needed]
-        self._measured = [index for index in self._required if index not in apart]
-        self._trigger = trigger
-        self._ticks_hz = ticks_hz
-        self.inputs = [InputObservation() for _ in offsets_ns]
-        nothing = tuple(InputCounts(fed=0, matched=0, dropped={}, buffered=0) for _ in offsets_ns)
+        self._offsets = tuple(topic.offset_ns for topic in config.topics)
+        self._required = [index for index, topic in enumerate(config.topics) if topic.required]
+        # How near those with a tolerance of their own are is not measured.
+        self._measured = [index for index in self._required if config.own_tolerances[index] is None]
+        self._trigger = config.trigger
+        self._ticks_hz = None if config.ticks is None else config.ticks.hz
+        self.inputs = [InputObservation() for _ in config.topics]
+        nothing = tuple(InputCounts(fed=0, matched=0, dropped={}, buffered=0) for _ in config.topics)
         self._polls = deque([_Poll(began, nothing, 0, 0, (0,) * len(nothing))])
         self._share = ShareWindow(
             self._required,
-            counted=self._required if trigger is None else [trigger],
-            ticks_hz=ticks_hz,
-            every=every,
-            least_period=least_period,
+            counted=self._required if self._trigger is None else [self._trigger],
+            ticks_hz=self._ticks_hz,
+            every=options.every,
+            least_period=options.max_rate,
         )
         self._span_histogram, self._latency_histogram = Tallied(), Tallied()
         self._last_set: int | None = None
@@ -74,12 +57,12 @@ class Observation:
         self._nearest_spans = NearestSpans(len(self._measured), distance)
         self._with_optional = {
             index: NearestSpans(len(self._required) + 1)
-            for index, needed in enumerate(required)
-            if not needed and distance is Distance.SPAN
+            for index, topic in enumerate(config.topics)
+            if not topic.required and distance is Distance.SPAN
         }
         self._nearest, self._nearest_at, self._nearest_since = no_values(), no_values(), no_values()
-        self._paces: list[float | None] = [None] * len(offsets_ns)
-        self._sets_since_without = [0] * len(offsets_ns)
+        self._paces: list[float | None] = [None] * len(self.inputs)
+        self._sets_since_without = [0] * len(self.inputs)
 
     def add(
         self,

@@ -48,17 +48,7 @@ class GroupWatch:
         self._was_paused = False
         self._unpaused: int | None = None
         self._woke: int | None = None
-        self._observation = Observation(
-            offsets_ns=[topic.offset_ns for topic in config.topics],
-            required=[topic.required for topic in config.topics],
-            began=began,
-            distance=config.options.distance,
-            trigger=config.trigger,
-            ticks_hz=self._ticks_hz,
-            apart=[index for index, own in enumerate(config.own_tolerances) if own is not None],
-            every=config.options.every,
-            least_period=config.options.max_rate,
-        )
+        self._observation = Observation(config, began=began)
         self._standing = StandingWatch()
         # Keys are not kept: what is matched by them cannot be run again. Nor can what a clock triggered: it may have
         # been a simulated one, and times of receipt are this machine's.

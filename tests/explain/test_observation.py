@@ -1,5 +1,6 @@
 """What is seen of streams: rates, delays, faults, windows; and that memory stays bounded."""
 
+from collections.abc import Sequence
 from operator import add
 from typing import Any
 
@@ -7,23 +8,30 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncrelay.config import Distance
 from syncrelay.explain.input_observation import InputObservation
 from syncrelay.explain.observation import Observation
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
+from tests.explain.scenario import Source, group_of
 from tests.explain.support.groups import BEGAN, MS, S
+
+
+def observation(offsets: Sequence[int], required: Sequence[bool], **options: Any) -> Observation:
+    """The observation of a group whose inputs have these offsets in nanoseconds."""
+    sources = [
+        Source(f"/in{index}", hz=1, required=needed, topic_options={"offset": f"{offset}ns"})
+        for index, (offset, needed) in enumerate(zip(offsets, required, strict=True))
+    ]
+    return Observation(group_of(sources, options or {"slop": "20ms", "max_wait": "100ms"}), began=BEGAN)
 
 
 class Stage:
     """An observation of inputs, fed second by second as a relay is."""
 
-    def __init__(self, n_inputs=2, *, began=BEGAN, offsets=None, required=None, **options):
+    def __init__(self, n_inputs=2, *, offsets=None, required=None, **options):
         self.n_inputs = n_inputs
-        self.now = began
-        self.observation = Observation(
-            offsets_ns=offsets or [0] * n_inputs, required=required or [True] * n_inputs, began=began, **options
-        )
+        self.now = BEGAN
+        self.observation = observation(offsets or [0] * n_inputs, required or [True] * n_inputs, **options)
         self.fed = [0] * n_inputs
         self.dropped: list[dict[DropReason, int]] = [{} for _ in range(n_inputs)]
         self.sets = 0
@@ -223,7 +231,7 @@ def test_the_best_rate_is_that_of_the_slowest_required_input_or_of_the_trigger()
 
     assert of() == 5
     assert of(required=[True, True, False]) == 10
-    assert of(trigger=0) == 20
+    assert of(policy="latest_time", trigger="/in0") == 20
 
 
 def test_what_was_missing_is_a_share_of_the_window():
@@ -253,9 +261,11 @@ def test_the_slowest_input_is_the_one_whose_messages_are_measured():
     assert stage.group.nearest.quantile(0.5) == 4 * MS
 
 
-@pytest.mark.parametrize(("distance", "measured"), [(Distance.SPAN, 40 * MS), (Distance.AGE, 60 * MS)])
-def test_of_a_trigger_it_is_measured_what_its_policy_bounds(distance, measured):
-    stage = Stage(trigger=0, distance=distance)
+@pytest.mark.parametrize(
+    ("options", "measured"), [({}, 40 * MS), ({"policy": "latest_time", "trigger": "/in0"}, 60 * MS)]
+)
+def test_it_is_measured_what_the_policy_bounds(options, measured):
+    stage = Stage(**options)
     for _ in range(3):
         stage.second(stage.stream(10), stage.stream(10, shift=-60 * MS))
     assert set(stage.group.nearest.values) == {measured}
@@ -313,11 +323,11 @@ def test_what_comes_at_once_is_judged_as_what_comes_one_by_one(first, second):
     st.tuples(*[st.integers(-9, 9)] * 3),
 )
 def test_spans_of_whole_sets_are_those_of_sets_one_by_one(sets, offsets):
-    observation = Observation(offsets_ns=offsets, required=[True, True, False], began=BEGAN)
+    seen = observation(offsets, [True, True, False])
     nothing = [InputCounts(0, 0, {}, 0)] * 3
-    observation.add([[]] * 3, [(stamps, 0) for stamps in sets], nothing, len(sets), now=BEGAN + S)
+    seen.add([[]] * 3, [(stamps, 0) for stamps in sets], nothing, len(sets), now=BEGAN + S)
     spans = [max(shifted) - min(shifted) for shifted in (list(map(add, stamps, offsets)) for stamps in sets)]
-    assert list(observation.figures(now=BEGAN + S)[0].spans.newest(99)) == spans[::-1]
+    assert list(seen.figures(now=BEGAN + S)[0].spans.newest(99)) == spans[::-1]
 
 
 def test_nothing_is_left_of_delays_when_this_machines_clock_is_set_back_and_no_stamps_are_set():
