@@ -1,4 +1,4 @@
-"""What the relay will find when it starts: its file, how it receives, and where it tells its state."""
+"""What the relay will find when it starts: its file, its path, and where it tells its state."""
 
 import socket
 
@@ -12,24 +12,6 @@ from syncrelay.doctor.diagnosis import Severity
 from syncrelay.doctor.examine import Examination
 from syncrelay.doctor.installation import look_at_installation
 from syncrelay.doctor.report import heading
-from syncrelay.doctor.start import StartResult, check_start
-
-
-def test_a_path_that_costs_more_is_an_info_with_its_reason():
-    started = StartResult(path="rclpy", path_fault="why", path_cost="it costs more", path_advice="what to do")
-    (found,) = check_start(started, before=())
-    assert (found.code, found.severity) == ("receive_path", Severity.INFO)
-    assert found.what == "messages pass through rclpy: why"
-    assert (found.impact, found.fix) == ("the relay works, but it costs more", "what to do")
-    assert list(check_start(StartResult(path="compiled"), before=())) == []
-    assert list(check_start(StartResult(path="rclpy"), before=())) == []
-
-
-def test_a_path_that_is_asked_for_and_cannot_be_had_is_an_error():
-    (found,) = check_start(StartResult(path_fault="SYNCRELAY_RECEIVE=dds: expected compiled or rclpy"), before=())
-    assert (found.code, found.severity) == ("receive_path", Severity.ERROR)
-    assert found.what == "SYNCRELAY_RECEIVE=dds: expected compiled or rclpy"
-    assert "unset SYNCRELAY_RECEIVE" in (found.fix or "")
 
 
 @pytest.mark.parametrize("path", BackendName)

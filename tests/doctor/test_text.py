@@ -18,26 +18,18 @@ IMAGE, CLOUD, IMU = "sensor_msgs/msg/Image", "sensor_msgs/msg/PointCloud2", "sen
 MS = 1_000_000
 
 
-def test_a_block_is_aligned_under_its_label():
-    found = error("code", "what\nmore", impact="impact", fix="fix\nthis")
+def test_a_block_is_aligned_under_its_label_and_moves_no_cursor():
+    found = error("code", "what\nmore", impact="impact", fix="fix\x1b[2J\nthis")
     assert list(diagnosis_lines(found, colour=False)) == [
         "error    what",
         "         more",
         "         impact: impact",
-        "         fix:    fix",
+        r"         fix:    fix\x1b[2J",
         "                 this",
     ]
     assert next(diagnosis_lines(found, colour=True)).startswith("\033[31merror")
-
-
-def test_what_has_no_impact_of_its_own_is_shown_without():
-    found = Diagnosis("code", Severity.WARNING, "what", None, "fix")
-    assert list(diagnosis_lines(found, colour=False)) == ["warning  what", "         fix:    fix"]
-
-
-def test_what_would_move_the_cursor_is_escaped():
-    found = info("code", "a\x1b[2Jb", impact="c\rd", fix="e")
-    assert "\x1b" not in "".join(diagnosis_lines(found, colour=False))
+    alone = Diagnosis("code", Severity.WARNING, "what", None, "fix")
+    assert list(diagnosis_lines(alone, colour=False)) == ["warning  what", "         fix:    fix"]
 
 
 A, B = error("a", "a", impact="", fix=""), info("b", "b", impact="", fix="")
