@@ -2,7 +2,7 @@
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypedDict
 
 from syncrelay.config import Distance, Tolerance
 from syncrelay.explain.clocks import Step
@@ -175,6 +175,22 @@ class ClockState(NamedTuple):
     stopped: int | None = None
 
 
+class Around(TypedDict, total=False):
+    """The facts that no observation of a group's own messages gives; `GroupFacts` says what each is."""
+
+    clock: ClockState | None
+    clock_set: Step | None
+    is_recorded: bool
+    waited: int
+    standstills: Sequence[Standstill]
+    failure: str | None
+    pause: Pause | None
+    asleep: bool
+    empty_graph: GraphSnapshot | None
+    is_discovering: bool
+    inactive: str | None
+
+
 @dataclass(frozen=True, slots=True)
 class GroupFacts:
     """A group at one moment; times and durations in nanoseconds. `GroupWatch.facts` fills it in."""
@@ -215,7 +231,7 @@ class GroupFacts:
     """Whether a recording is judged, and no live graph."""
     waited: int = 0
     """The longest recent wait of its messages in the receive queue."""
-    standstills: tuple[Standstill, ...] = ()
+    standstills: Sequence[Standstill] = ()
     """When the process recently got no turn."""
     failure: str | None = None
     """What stopped the group for good."""

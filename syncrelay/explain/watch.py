@@ -2,19 +2,10 @@
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
+from typing import Unpack
 
 from syncrelay.config import GroupConfig
-from syncrelay.explain.clocks import Step
-from syncrelay.explain.facts import (
-    ClockState,
-    GraphSnapshot,
-    GroupFacts,
-    InputFacts,
-    InputGraph,
-    Pause,
-    Standstill,
-    serving,
-)
+from syncrelay.explain.facts import Around, GroupFacts, InputFacts, InputGraph, serving
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.standing import StandingWatch
@@ -87,21 +78,11 @@ class GroupWatch:
         graph: Sequence[InputGraph],
         *,
         now: int,
-        clock: ClockState | None = None,
-        clock_set: Step | None = None,
-        is_recorded: bool = False,
-        waited: int = 0,
-        standstills: Sequence[Standstill] = (),
-        failure: str | None = None,
-        pause: Pause | None = None,
-        asleep: bool = False,
-        empty_graph: GraphSnapshot | None = None,
-        is_discovering: bool = False,
-        inactive: str | None = None,
+        **around: Unpack[Around],
     ) -> GroupFacts:
         """Give all that is known now."""
         options = self.config.options
-        self._follow_pauses(now, is_paused=pause is not None)
+        self._follow_pauses(now, is_paused=around.get("pause") is not None)
         self._compare_publishers(graph)
         types = [
             shown.type_from.type if topic.type is None and shown.type_from else topic.type
@@ -148,21 +129,11 @@ class GroupWatch:
             max_wait=options.max_wait,
             every=options.every,
             least_period=options.max_rate,
-            clock=clock,
-            clock_set=clock_set,
-            is_recorded=is_recorded,
-            waited=waited,
-            standstills=tuple(standstills),
-            failure=failure,
-            pause=pause,
             unpaused=self._unpaused,
-            asleep=asleep,
             suggester=self._suggester,
-            empty_graph=empty_graph,
-            is_discovering=is_discovering,
-            inactive=inactive,
+            **around,
         )
-        if asleep:
+        if facts.asleep:
             return facts
         # A group whose publishers have just come has not missed a set yet.
         is_silent = facts.is_silent and not facts.is_new
