@@ -134,6 +134,20 @@ CAUSES: dict[str, tuple[Callable[[], Told], str, tuple[str, ...]]] = {
         )
         for than, options in (("", {}), (" than was taken", UNTYPED))
     },
+    # At 4 Hz, half of the messages come between two sweeps of the lidar.
+    **{
+        f"an optional input of {hz} Hz comes after {delay_ms} ms": (
+            partial(
+                run,
+                *(Source("/camera", 20), Source("/lidar", 10), Source("/gps", hz, delay_ms=delay_ms, required=False)),
+                seconds=30,
+                options={"slop": "40ms", "max_wait": "60ms"},
+            ),
+            "waiting_for_optional",
+            ("/gps",),
+        )
+        for hz, delay_ms in ((2, 200), (4, 5))
+    },
     "a topic without a type has two": (
         lambda: a_pair(
             sends=lambda second: second > 30,
