@@ -128,15 +128,12 @@ def test_a_cluster_that_cannot_be_reached_is_told(isolated, tmp_path):
 
 
 _TWO_NODES = """
-import os, signal, subprocess, sys, time
+import os, resource, signal, subprocess, sys, time
 from pathlib import Path
+from tests.ros.processes import children_of, wait_until
 
 def below(pid):
-    try:
-        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    except OSError:
-        return []
-    return [each for child in children for each in (int(child), *below(int(child)))]
+    return [each for child in children_of(pid) for each in (child, *below(child))]
 
 def title(pid):
     try:
@@ -151,12 +148,6 @@ def start(*words):
 def lines():
     return Path("out/_ledger.jsonl").read_text().count("\\n") if Path("out/_ledger.jsonl").exists() else 0
 
-def wait_until(condition, deadline_s=300):
-    end = time.monotonic() + deadline_s
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.002)
-
 address = "10.99.0.1:6399"
 head = start("--head", "--port=6399", "--node-ip-address=10.99.0.1", "--include-dashboard=false")
 import ray
@@ -170,29 +161,21 @@ def is_up():
         return False
     return True
 
-wait_until(is_up)
+wait_until(is_up, "the head", deadline_s=300)
 other = start(f"--address={address}", "--node-ip-address=10.99.0.1")
-wait_until(lambda: ray.cluster_resources().get("CPU") == 2)
+wait_until(lambda: ray.cluster_resources().get("CPU") == 2, "the other node", deadline_s=300)
 ray.shutdown()
 command = subprocess.Popen([sys.executable, "-m", "syncrelay", *sys.argv[2:]])
-most = 0
-
-def memory():
-    for line in Path(f"/proc/{command.pid}/status").read_text().splitlines():
-        if line.startswith("VmHWM"):
-            return int(line.split()[1])
-    return 0
-
-wait_until(lambda: lines() > int(sys.argv[1]) and any(b"perform" in title(pid) for pid in below(other.pid)))
+wait_until(
+    lambda: lines() > int(sys.argv[1]) and any(b"perform" in title(pid) for pid in below(other.pid)),
+    "a worker of the other node", deadline_s=300, poll_s=0.002,
+)
 for pid in (*below(other.pid), other.pid):
     os.kill(pid, signal.SIGKILL)
 done = lines()
-while command.poll() is None:
-    most = max(most, memory())
-    time.sleep(0.1)
-code = command.returncode
+code = command.wait()
+print(done, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss // 1000)
 head.terminate()
-print(done, most // 1000)
 sys.exit(code)
 """
 
@@ -221,3 +204,22 @@ def test_a_node_that_is_lost_midway_loses_and_doubles_nothing(isolated, tmp_path
         f"Ray, {_RECORDINGS} recordings on 2 nodes, one killed when {done} were done: each is there once;"
         f" the command took {megabytes} MB of memory"
     )
+
+
+_ROWS = """
+import ray
+from syncrelay.recordings.datasets import ray_dataset, read_sets
+ray.init("local", num_cpus=2, include_dashboard=False)
+bags = [f"bags/r{number}.mcap" for number in range(3)]
+key = lambda row: (row["recording"], row["set"])
+rows = ray_dataset(bags, "f.yaml", memory=10**8).select_columns(["recording", "set", "/camera"]).take_all()
+expected = [row for batch in read_sets(bags, "f.yaml") for row in batch.to_pylist()]
+assert len(rows) > 80
+assert sorted(rows, key=key) == [{name: row[name] for name in rows[0]} for row in expected]
+"""
+
+
+def test_a_dataset_of_ray_has_the_rows_that_are_read_here(isolated, tmp_path):
+    make_fleet(tmp_path)
+    ended = isolated("-c", _ROWS, folder=tmp_path)
+    assert ended.returncode == 0, ended.stderr
