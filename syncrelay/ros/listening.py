@@ -122,9 +122,12 @@ class _Listener:
         if any(is_relayed(self._node, each, name) for each in publishers):
             self._relayed.add(name)
             return
-        offered = [each.qos_profile for each in publishers if each.topic_type == type_name]
-        self._topics[name] = HeardTopic(name, type_name, all(map(_is_reliable, offered)))
-        self._subscribe(self._topics[name], message_type, input_profile(QosOverrides(), offered))
+        profile = input_profile(
+            QosOverrides(), [each.qos_profile for each in publishers if each.topic_type == type_name]
+        )
+        is_reliable = profile is not None and profile.reliability == QoSReliabilityPolicy.RELIABLE
+        self._topics[name] = HeardTopic(name, type_name, is_reliable)
+        self._subscribe(self._topics[name], message_type, profile)
 
     def _imported(self, type_name: str) -> Any:
         """Import a type that others name. Importing runs its package, so it must be installed as one with messages."""
@@ -144,10 +147,6 @@ class _Listener:
         source = self._backend.source(subscription, take)
         self._subscribed.append((subscription, source))
         self._loop.add(source, _give_up)
-
-
-def _is_reliable(profile: Any) -> bool:
-    return bool(profile.reliability == QoSReliabilityPolicy.RELIABLE)
 
 
 def _give_up(error: Exception) -> None:

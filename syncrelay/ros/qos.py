@@ -1,7 +1,8 @@
 """QoS: what the file asks for, filled in with what publishers offer."""
 
 from collections.abc import Sequence
-from typing import Any, TypeAlias
+from copy import copy
+from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.qos import (
@@ -21,8 +22,6 @@ _DEPTH = 100
 # Fast DDS keeps as many with keep_all.
 _KEPT = 5000
 
-_Policies: TypeAlias = dict[str, Any]
-
 
 def input_profile(asked: QosPreset | QosOverrides, offered: Sequence[QoSProfile]) -> QoSProfile | None:
     """Return the QoS to subscribe with: what the file says, and for the rest what every publisher can serve.
@@ -35,7 +34,13 @@ def input_profile(asked: QosPreset | QosOverrides, offered: Sequence[QoSProfile]
     policies = _asked_policies(asked)
     if not offered and not {"reliability", "durability"} <= policies.keys():
         return None
-    return QoSProfile(**{"depth": _DEPTH, **_served_by_all(offered), **policies})
+    is_reliable = all(each.reliability == QoSReliabilityPolicy.RELIABLE for each in offered)
+    is_latched = all(each.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL for each in offered)
+    served_by_all = {
+        "reliability": QoSReliabilityPolicy.RELIABLE if is_reliable else QoSReliabilityPolicy.BEST_EFFORT,
+        "durability": QoSDurabilityPolicy.TRANSIENT_LOCAL if is_latched else QoSDurabilityPolicy.VOLATILE,
+    }
+    return QoSProfile(**{"depth": _DEPTH, **served_by_all, **policies})
 
 
 def output_profile(received: QoSProfile) -> QoSProfile:
@@ -46,28 +51,9 @@ def output_profile(received: QoSProfile) -> QoSProfile:
     """
     if received.history != QoSHistoryPolicy.KEEP_ALL:
         return received
-    policies = {name: getattr(received, name) for name in _OUTPUT_POLICIES}
-    return QoSProfile(history=QoSHistoryPolicy.KEEP_LAST, depth=_KEPT, **policies)
-
-
-_OUTPUT_POLICIES = (
-    "reliability",
-    "durability",
-    "deadline",
-    "lifespan",
-    "liveliness",
-    "liveliness_lease_duration",
-    "avoid_ros_namespace_conventions",
-)
-
-
-def _served_by_all(offered: Sequence[QoSProfile]) -> _Policies:
-    reliable = all(each.reliability == QoSReliabilityPolicy.RELIABLE for each in offered)
-    latched = all(each.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL for each in offered)
-    return {
-        "reliability": QoSReliabilityPolicy.RELIABLE if reliable else QoSReliabilityPolicy.BEST_EFFORT,
-        "durability": QoSDurabilityPolicy.TRANSIENT_LOCAL if latched else QoSDurabilityPolicy.VOLATILE,
-    }
+    sent = copy(received)
+    sent.history, sent.depth = QoSHistoryPolicy.KEEP_LAST, _KEPT
+    return sent
 
 
 _NAMED = {
@@ -78,7 +64,7 @@ _NAMED = {
 }
 
 
-def _asked_policies(asked: QosOverrides) -> _Policies:
+def _asked_policies(asked: QosOverrides) -> dict[str, Any]:
     policies = asked.model_dump(exclude_none=True)
     named = {key: _NAMED[key].get_from_short_key(policies[key]) for key in _NAMED if key in policies}
     durations = {

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from syncrelay.cdr import LATEST_STAMP
-from syncrelay.dataflow.backend import ALL, BackendName, PublishError
+from syncrelay.dataflow.backend import BackendName, PublishError
 from syncrelay.errors import RosUnavailableError, UsageError
 from tests.ros.cdr_messages import padded, vector, with_stamp
 from tests.ros.processes import DEADLINE_S, wait_until
@@ -17,16 +17,14 @@ from tests.ros.streams import BEGIN, MS
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from geometry_msgs.msg import Vector3Stamped
-from rclpy.qos import HistoryPolicy, QoSProfile
+from rclpy.qos import QoSProfile
 
 from syncrelay.ros import backend_choice
 from syncrelay.ros.backend_choice import choose_backend
-from tests.ros.in_process import own_node
+from tests.ros.in_process import own_backend, take, vectors_on
 
 pytestmark = pytest.mark.ros
 
-_KEEP_ALL = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 _SECOND = 1_000_000_000
 # Longer than any test takes.
 _NEVER = 1_000 * _SECOND
@@ -36,33 +34,18 @@ _SOON_S = 0.0005
 
 @pytest.fixture(params=BACKENDS)
 def here(request, ros_domain: int) -> Iterator[SimpleNamespace]:
-    """A node of this process, a backend on it, and topics."""
-    with own_node(ros_domain) as own:
-        own.backend = choose_backend(request.param, node=own.node, context=own.context)
-        own.topics = [_topic(own.node, f"/t{n}") for n in range(3)]
+    with own_backend(ros_domain, request.param) as own:
         yield own
-
-
-def _topic(node, name, profile=_KEEP_ALL):
-    """A topic with a subscription and a publisher."""
-    subscription = node.create_subscription(Vector3Stamped, name, print, profile, raw=True)
-    return SimpleNamespace(subscription=subscription, publisher=node.create_publisher(Vector3Stamped, name, profile))
-
-
-def _take(source):
-    """Its oldest message, whether it was reported or not."""
-    source.pending = ALL
-    return source.take()
 
 
 def test_a_message_comes_out_as_it_went_in(here):
     source = here.backend.source(here.topics[0].subscription, print)
     payload = vector(BEGIN, frame_id="a frame")
     here.topics[0].publisher.publish(payload)
-    taken = _take(source)
+    taken = take(source)
     assert bytes(taken.content()) == padded(payload)
     assert taken.received > BEGIN
-    assert _take(source) is None
+    assert take(source) is None
 
 
 @pytest.mark.parametrize("little_endian", [True, False])
@@ -72,11 +55,11 @@ def test_a_payload_that_serves_two_sets_keeps_its_own_stamp(here, little_endian)
     for stamp in [0, -1, LATEST_STAMP, *(chance.randrange(-(2**31) * _SECOND, LATEST_STAMP) for _ in range(50))]:
         original = padded(vector(BEGIN, little_endian=little_endian))
         topic.publisher.publish(original)
-        payload = _take(source)
+        payload = take(source)
         outlet.send_stamped(payload, stamp)
         outlet.send(payload)
-        assert bytes(_take(source).content()) == with_stamp(original, stamp)
-        assert bytes(_take(source).content()) == bytes(payload.content()) == original
+        assert bytes(take(source).content()) == with_stamp(original, stamp)
+        assert bytes(take(source).content()) == bytes(payload.content()) == original
     with pytest.raises(ValueError, match="does not fit"):
         outlet.send_stamped(payload, LATEST_STAMP + 1)
     assert bytes(payload.content()) == original
@@ -88,7 +71,7 @@ def test_what_is_serialized_here_is_published_and_counted(here):
     contents = [padded(vector(BEGIN, frame_id="x" * length)) for length in (0, 1, 1000, 5)]
     for content in contents:
         outlet.send_content(content)
-    assert [bytes(_take(source).content()) for _ in contents] == contents
+    assert [bytes(take(source).content()) for _ in contents] == contents
     assert outlet.sent == 4
     assert outlet.is_heard()
 
@@ -97,7 +80,7 @@ def test_a_message_that_rcl_does_not_publish_says_why(here):
     topic = here.topics[0]
     source, outlet = here.backend.source(topic.subscription, print), here.backend.outlet(topic.publisher)
     topic.publisher.publish(vector(BEGIN))
-    payload = _take(source)
+    payload = take(source)
     # rcl's own: rclpy's would destroy the node too, since Kilted.
     with here.context.handle:
         here.context.handle.shutdown()
@@ -205,7 +188,7 @@ def test_a_source_whose_messages_cannot_be_taken_in_is_named_and_the_others_go_o
 def test_sources_come_and_go_while_messages_come(here):
     came, ended = [], threading.Event()
     # What is never taken must not hold up the publishers.
-    topics = [_topic(here.node, f"/u{n}", QoSProfile(depth=100)) for n in range(3)]
+    topics = [vectors_on(here.node, f"/u{n}", QoSProfile(depth=100)) for n in range(3)]
 
     def publish() -> None:
         while not ended.is_set():

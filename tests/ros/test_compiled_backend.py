@@ -14,7 +14,7 @@ from types import SimpleNamespace
 import pytest
 
 from syncrelay.config import load_text
-from syncrelay.dataflow.backend import ALL, BackendName
+from syncrelay.dataflow.backend import BackendName
 from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.manifest import ManifestWriter
@@ -32,18 +32,16 @@ if not IS_COMPILED:
     pytest.skip("the compiled path was not built: it needs a C compiler", allow_module_level=True)
 
 from geometry_msgs.msg import Vector3Stamped
-from rclpy.qos import HistoryPolicy, QoSProfile
 
 from syncrelay.ros import backend_choice
 from syncrelay.ros.backend_choice import choose_backend
 from syncrelay.ros.compiled import backend as compiled_backend
 from syncrelay.ros.compiled import path
 from syncrelay.ros.outputs import handler
-from tests.ros.in_process import own_node
+from tests.ros.in_process import own_backend, own_node, take
 
 pytestmark = pytest.mark.ros
 
-_KEEP_ALL = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 _IMAGE_BYTES = 1_000_000
 _SECOND = 1_000_000_000
 _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
@@ -51,28 +49,13 @@ _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
 
 @pytest.fixture
 def here(ros_domain: int) -> Iterator[SimpleNamespace]:
-    """A node of this process, the compiled backend as it proved itself on it, and topics."""
-    with own_node(ros_domain) as own:
-        own.backend = choose_backend("compiled", node=own.node, context=own.context)
-        own.topics = [
-            SimpleNamespace(
-                subscription=own.node.create_subscription(Vector3Stamped, name, print, _KEEP_ALL, raw=True),
-                publisher=own.node.create_publisher(Vector3Stamped, name, _KEEP_ALL),
-            )
-            for name in ("/t0", "/t1")
-        ]
+    with own_backend(ros_domain, "compiled") as own:
         yield own
 
 
 def _group(**keys):
     text = config({"front": {"policy": "exact_time", "topics": inputs(_PAIR), **keys}})
     return GroupRelay(load_text(text).groups[0], now=time.monotonic_ns, flow=path.Flow)
-
-
-def _take(source):
-    """Its oldest message, whether DDS reported it or not."""
-    source.pending = ALL
-    return source.take()
 
 
 def _stand_in(monkeypatch, name: str, function) -> None:
@@ -110,7 +93,7 @@ def test_every_memory_comes_back_once_whatever_became_of_its_message(here):
     chance = random.Random(1)
     for n in range(3000):
         topic.publisher.publish(vector(BEGIN + (n // 2 - chance.choice([0, 0, 0, 1, 3])) * MS))
-        payload = _take(source)
+        payload = take(source)
         for pair in takes:
             pair[n % 2](payload)
         del payload
@@ -135,7 +118,7 @@ def test_a_group_that_ends_gives_its_memory_back_without_the_collector(here):
     group.tell_sets(queue.begin("front", writer, outlet))
     for n in range(20):
         topic.publisher.publish(vector(BEGIN + n * MS))
-        source.deliver(_take(source))
+        source.deliver(take(source))
     assert source.pool.lent == 21
     gc.disable()
     try:
@@ -160,12 +143,12 @@ def test_python_never_holds_the_bytes_of_a_message(here):
         topic.publisher.publish(with_stamp(payload, stamp))
     tracemalloc.start()
     for n in range(2 * len(stamps)):
-        handlers[n % 2](_take(source))
+        handlers[n % 2](take(source))
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert group.engine.sets == len(stamps)
     assert peak < _IMAGE_BYTES / 10
-    sent = [bytes(_take(source).content()) for _ in range(2 * len(stamps))]
+    sent = [bytes(take(source).content()) for _ in range(2 * len(stamps))]
     assert sent == [with_stamp(payload, stamp) for stamp in stamps for _ in range(2)]
 
 

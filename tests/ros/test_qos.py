@@ -62,6 +62,7 @@ def test_an_output_of_an_input_that_keeps_all_keeps_the_last_5000():
     received = input_profile(QosOverrides(history="keep_all", deadline=5 * MS), [_offer(_RELIABLE, _LATCHED)])
     assert received is not None
     sent = output_profile(received)
+    assert received.history == QoSHistoryPolicy.KEEP_ALL
     assert (sent.history, sent.depth) == (QoSHistoryPolicy.KEEP_LAST, 5000)
     assert mismatch(sent, received) is None
 
