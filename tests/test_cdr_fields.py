@@ -94,15 +94,12 @@ def test_a_payload_cut_off_before_its_field_ends_gives_none(path):
     assert set(whole[first:]) == {_ALL[path]}
 
 
-@given(st.binary(max_size=120), st.sampled_from(sorted(_ALL)))
-def test_any_bytes_give_a_value_or_none(payload, path):
-    value = _read(path, payload)
-    assert value is None or isinstance(value, type(_ALL[path]))
+_GOOD_HEADERS = st.sampled_from([bytes([0, kind, 0, 0]) for kind in (0, 1, 6, 7)])
 
 
-@given(st.binary(max_size=120), st.sampled_from([0, 1, 6, 7]), st.sampled_from(sorted(_ALL)))
-def test_any_bytes_behind_a_good_header_give_a_value_or_none(body, kind, path):
-    value = _read(path, bytes([0, kind, 0, 0]) + body)
+@given(_GOOD_HEADERS | st.just(b""), st.binary(max_size=120), st.sampled_from(sorted(_ALL)))
+def test_any_bytes_give_a_value_or_none_behind_a_good_header_too(header, body, path):
+    value = _read(path, header + body)
     assert value is None or isinstance(value, type(_ALL[path]))
 
 

@@ -12,16 +12,7 @@ from hypothesis import strategies as st
 
 import syncrelay.config.yaml_tree
 from syncrelay.config import ConfigError, load, load_text
-
-GOOD = """\
-version: 1
-groups:
-  front:
-    policy: exact_time
-    topics:
-      - {topic: /a, type: sensor_msgs/msg/Image}
-      - {topic: /b, type: sensor_msgs/msg/Image}
-"""
+from tests.cli.command import GOOD
 
 
 @pytest.fixture

@@ -10,16 +10,8 @@ from pathlib import Path
 import pytest
 
 from syncrelay.config import ConfigError, load
+from tests.cli.command import GOOD
 
-GOOD = """\
-version: 1
-groups:
-  front:
-    policy: exact_time
-    topics:
-      - {topic: /a, type: sensor_msgs/msg/Image}
-      - {topic: /b, type: sensor_msgs/msg/Image}
-"""
 _NO_END = "could not be read to its end within 0.2 s: is it a pipe that nobody writes to, or closes?"
 
 
