@@ -95,90 +95,86 @@ BY_CLOCK = sets_by_clock((0, 10), (1, 20), (0, 40), (1, 45), (0, 190))
 LATEST_OF_BOTH = sets_of((1, 10), (0, 100), (1, 110), (0, 120))
 OPEN_PAIR = sets_after(50, (0, 100), (1, 101))
 
-OPTIONS = {
+Row = tuple[str, str, Callable[[Config], object]]
+
+
+def of_group(outcome: Callable[[Config], object], keys: dict[str, Any] = APPROXIMATE, **values: Any) -> Row:
+    """Two files of groups with these keys, which differ in one: its values, or the one that it has in the second."""
+    ((key, value),) = values.items()
+    one, other = ({key: each} for each in value) if isinstance(value, tuple) else ({}, {key: value})
+    return file({**keys, **one}), file({**keys, **other}), outcome
+
+
+def of_topic(outcome: Callable[[Config], object], keys: dict[str, Any] = APPROXIMATE, **key: Any) -> Row:
+    """Two files of groups with these keys; the first topic of the second has a key more."""
+    return file(keys), file(keys, first=key), outcome
+
+
+def of_section(outcome: Callable[[Config], object], **section: Any) -> Row:
+    return file(), file(**section), outcome
+
+
+def of_node(name: str, value: object) -> Row:
+    return of_section(lambda config: getattr(config.node, name), node={name: value})
+
+
+WITH_OPTIONAL = {**EXACT, "topics": [{"topic": "/a", "type": IMAGE, **OPTIONAL}, {"topic": "/b", "type": IMAGE}]}
+BY_B = {**LATEST, "trigger": "/b", "max_age": "1s"}
+
+OPTIONS: dict[str, Row] = {
     "policy": (file(), file(EXACT), NEAR_PAIRS),
-    "queue_size": (file({**EXACT, "queue_size": 1}), file({**EXACT, "queue_size": 2}), ONE_INPUT_AHEAD),
-    "slop": (file(), file({**APPROXIMATE, "slop": "5ms"}), WIDER_PAIRS),
-    "age_penalty": (
-        file({**APPROXIMATE, "age_penalty": 0}),
-        file({**APPROXIMATE, "age_penalty": 1}),
-        TWO_SPANS_TO_CHOOSE_FROM,
-    ),
-    "restamp": (file(), file({**APPROXIMATE, "restamp": "earliest"}), NEAR_PAIRS),
-    "restamp: latest": (
-        file({**APPROXIMATE, "restamp": "earliest"}),
-        file({**APPROXIMATE, "restamp": "latest"}),
-        NEAR_PAIRS,
-    ),
-    "restamp: input": (
-        file({**APPROXIMATE, "restamp": "/a"}),
-        file({**APPROXIMATE, "restamp": "/b"}),
-        NEAR_PAIRS,
-    ),
-    "required": (
-        file({**EXACT, "max_wait": 1}),
-        file({**EXACT, "max_wait": 1}, first=OPTIONAL),
-        sets_of((1, 10), (0, 20)),
-    ),
-    "max_wait": (
-        file({**EXACT, "max_wait": "10ms"}, first=OPTIONAL),
-        file({**EXACT, "max_wait": "1s"}, first=OPTIONAL),
-        sets_after(50, (1, 100)),
-    ),
-    "max_wait: all required": (file(), file({**APPROXIMATE, "max_wait": "10ms"}), OPEN_PAIR),
-    "max_rate": (file(EXACT), file({**EXACT, "max_rate": "10 Hz"}), EXACT_PAIRS),
-    "every": (file(EXACT), file({**EXACT, "every": 2}), EXACT_PAIRS),
-    "trigger": (file(LATEST), file({**LATEST, "trigger": "/b"}), LATEST_OF_BOTH),
-    "trigger: a clock": (file({**LATEST, "trigger": "30 Hz"}), file({**LATEST, "trigger": 20}), BY_CLOCK),
-    "max_wait: by a clock": (file(CLOCK), file({**CLOCK, "max_wait": "30ms"}), BY_CLOCK),
-    "max_age: by a clock": (file(CLOCK), file({**CLOCK, "max_age": "20ms"}), BY_CLOCK),
-    "restamp: trigger": (file(CLOCK), file({**CLOCK, "restamp": "trigger"}), BY_CLOCK),
-    "restamp: trigger of an input": (
-        file({**LATEST, "restamp": "earliest"}),
-        file({**LATEST, "restamp": "trigger"}),
-        LATEST_OF_BOTH,
-    ),
-    "max_age": (file(LATEST), file({**LATEST, "max_age": "50ms"}), LATEST_OF_BOTH),
-    "max_age: own": (
-        file({**LATEST, "trigger": "/b", "max_age": "1s"}),
-        file({**LATEST, "trigger": "/b", "max_age": "1s"}, first={"max_age": "5ms"}),
-        LATEST_OF_BOTH,
-    ),
-    "max_age: own, by a clock": (file(CLOCK), file(CLOCK, first={"max_age": "20ms"}), BY_CLOCK),
-    "key": (file(KEYED), file({**KEYED, "key": "header.frame_id"}), of_first_topic("key")),
-    "key: own": (file(KEYED), file(KEYED, first={"key": "header.stamp.sec"}), of_first_topic("key")),
-    "offset": (file(EXACT), file(EXACT, first={"offset": "-50ms"}), sets_of((0, 150), (1, 100))),
-    "min_period": (file(), file(first={"min_period": "90ms"}), sets_of((0, 14), (1, 15))),
-    "topic": (file(), file(first={"topic": "/z"}), of_first_topic("topic")),
-    "type": (file(), file(first={"type": "sensor_msgs/msg/Imu"}), of_first_topic("type")),
-    "output": (file(), file(first={"output": "/z"}), outputs),
-    "output_prefix": (file(), file({**APPROXIMATE, "output_prefix": "/z"}), outputs),
-    "lazy": (file(), file({**APPROXIMATE, "lazy": True}), lambda config: config.groups[0].options.lazy),
-    "manifest": (file(), file({**APPROXIMATE, "manifest": False}), own_topics),
-    "qos": (file(), file(first={"qos": "sensor_data"}), of_first_topic("qos")),
-    "stamp": (file(), file(first={"stamp": "receive"}), of_first_topic("stamp")),
-    "field": (file(), file(first={"stamp": {"field": "header.stamp"}}), of_first_topic("stamp")),
-    "topics": (file(), file(first={"topic": "/z"}), outputs),
+    "queue_size": of_group(ONE_INPUT_AHEAD, EXACT, queue_size=(1, 2)),
+    "slop": of_group(WIDER_PAIRS, slop="5ms"),
+    "age_penalty": of_group(TWO_SPANS_TO_CHOOSE_FROM, age_penalty=(0, 1)),
+    "restamp": of_group(NEAR_PAIRS, restamp="earliest"),
+    "restamp: latest": of_group(NEAR_PAIRS, restamp=("earliest", "latest")),
+    "restamp: input": of_group(NEAR_PAIRS, restamp=("/a", "/b")),
+    "required": of_topic(sets_of((1, 10), (0, 20)), {**EXACT, "max_wait": 1}, **OPTIONAL),
+    "max_wait": of_group(sets_after(50, (1, 100)), WITH_OPTIONAL, max_wait=("10ms", "1s")),
+    "max_wait: all required": of_group(OPEN_PAIR, max_wait="10ms"),
+    "max_rate": of_group(EXACT_PAIRS, EXACT, max_rate="10 Hz"),
+    "every": of_group(EXACT_PAIRS, EXACT, every=2),
+    "trigger": of_group(LATEST_OF_BOTH, LATEST, trigger="/b"),
+    "trigger: a clock": of_group(BY_CLOCK, LATEST, trigger=("30 Hz", 20)),
+    "max_wait: by a clock": of_group(BY_CLOCK, CLOCK, max_wait="30ms"),
+    "max_age: by a clock": of_group(BY_CLOCK, CLOCK, max_age="20ms"),
+    "restamp: trigger": of_group(BY_CLOCK, CLOCK, restamp="trigger"),
+    "restamp: trigger of an input": of_group(LATEST_OF_BOTH, LATEST, restamp=("earliest", "trigger")),
+    "max_age": of_group(LATEST_OF_BOTH, LATEST, max_age="50ms"),
+    "max_age: own": of_topic(LATEST_OF_BOTH, BY_B, max_age="5ms"),
+    "max_age: own, by a clock": of_topic(BY_CLOCK, CLOCK, max_age="20ms"),
+    "key": of_group(of_first_topic("key"), KEYED, key="header.frame_id"),
+    "key: own": of_topic(of_first_topic("key"), KEYED, key="header.stamp.sec"),
+    "offset": of_topic(sets_of((0, 150), (1, 100)), EXACT, offset="-50ms"),
+    "min_period": of_topic(sets_of((0, 14), (1, 15)), min_period="90ms"),
+    "topic": of_topic(of_first_topic("topic"), topic="/z"),
+    "type": of_topic(of_first_topic("type"), type="sensor_msgs/msg/Imu"),
+    "output": of_topic(outputs, output="/z"),
+    "output_prefix": of_group(outputs, output_prefix="/z"),
+    "lazy": of_group(lambda config: config.groups[0].options.lazy, lazy=True),
+    "manifest": of_group(own_topics, manifest=False),
+    "qos": of_topic(of_first_topic("qos"), qos="sensor_data"),
+    "stamp": of_topic(of_first_topic("stamp"), stamp="receive"),
+    "field": of_topic(of_first_topic("stamp"), stamp={"field": "header.stamp"}),
+    "topics": of_topic(outputs, topic="/z"),
     "groups": (file(), file().replace("front", "back"), outputs),
-    "name": (file(), file(node={"name": "z"}), lambda config: config.node.name),
-    "namespace": (file(), file(node={"namespace": "/z"}), lambda config: config.node.namespace),
-    "transport": (file(), file(node={"transport": "large_messages"}), lambda config: config.node.transport),
-    "services": (file(), file(node={"services": False}), lambda config: config.node.services),
-    "coalesce": (file(), file(node={"coalesce": "1ms"}), lambda config: config.node.coalesce),
-    "lifecycle": (file(), file(node={"lifecycle": True}), lambda config: config.node.lifecycle),
-    "use_sim_time": (file(), file(node={"use_sim_time": True}), lambda config: config.node.use_sim_time),
-    "node": (file(), file(node={"name": "z"}), lambda config: config.node),
-    "metrics": (file(), file(metrics=None), lambda config: config.listen),
-    "listen": (file(), file(metrics={"listen": "0.0.0.0:80"}), lambda config: config.listen),
-    "hosts": (file(), file(metrics={"hosts": ["robot"]}), lambda config: config.listen),
-    "hosts: beside listen": (
-        file(metrics={"listen": "0.0.0.0:80"}),
-        file(metrics={"listen": "0.0.0.0:80", "hosts": ["robot"]}),
-        lambda config: config.listen,
+    "name": of_node("name", "z"),
+    "namespace": of_node("namespace", "/z"),
+    "transport": of_node("transport", "large_messages"),
+    "services": of_node("services", value=False),
+    "coalesce": of_node("coalesce", "1ms"),
+    "lifecycle": of_node("lifecycle", value=True),
+    "use_sim_time": of_node("use_sim_time", value=True),
+    "node": of_section(lambda config: config.node, node={"name": "z"}),
+    "metrics": of_section(lambda config: config.listen, metrics=None),
+    "listen": of_section(lambda config: config.listen, metrics={"listen": "0.0.0.0:80"}),
+    "hosts": of_section(lambda config: config.listen and config.listen.hosts, metrics={"hosts": ["robot"]}),
+    "hosts: beside listen": of_section(
+        lambda config: config.listen and config.listen.hosts, metrics={"listen": "0.0.0.0:80", "hosts": ["robot"]}
     ),
-    "diagnostics": (file(), file(diagnostics=None), lambda config: config.diagnostics),
-    "scalars": (file(), file(diagnostics={"scalars": True}), lambda config: config.diagnostics),
-    "defaults": (file(), file(defaults={"output_prefix": "/z"}), outputs),
+    "diagnostics": of_section(lambda config: config.diagnostics, diagnostics=None),
+    "scalars": of_section(lambda config: config.diagnostics, diagnostics={"scalars": True}),
+    "defaults": of_section(outputs, defaults={"output_prefix": "/z"}),
 }
 LEROBOT: dict[str, Any] = {"fps": 10, "task": "pick", "features": {"action": "/a:height"}}
 
@@ -200,9 +196,12 @@ OPTIONS |= {
     key: (file(export={"lerobot": LEROBOT}), file(export={"lerobot": LEROBOT | keys}), lambda config: config.lerobot)
     for key, keys in _OF_LEROBOT.items()
 }
-OPTIONS |= {
-    key: (file(), file(export={"lerobot": LEROBOT}), lambda config: config.lerobot) for key in ("export", "lerobot")
-}
+OPTIONS["max_gap: longer"] = (
+    file(export={"lerobot": LEROBOT | {"max_gap": "2s"}}),
+    file(export={"lerobot": LEROBOT | {"max_gap": "3s"}}),
+    lambda config: config.lerobot,
+)
+OPTIONS |= dict.fromkeys(("export", "lerobot"), of_section(lambda config: config.lerobot, export={"lerobot": LEROBOT}))
 OPTIONS["group"] = (_of_two_groups("front"), _of_two_groups("back"), lambda config: config.lerobot)
 QOS_POLICIES = {
     "history": "keep_all",
@@ -215,9 +214,7 @@ QOS_POLICIES = {
     "liveliness_lease_duration": {"sec": 1, "nsec": 0},
     "avoid_ros_namespace_conventions": True,
 }
-OPTIONS |= {
-    key: (file(), file(first={"qos": {key: value}}), of_first_topic("qos")) for key, value in QOS_POLICIES.items()
-}
+OPTIONS |= {key: of_topic(of_first_topic("qos"), qos={key: value}) for key, value in QOS_POLICIES.items()}
 
 
 @pytest.mark.parametrize(("one", "other", "outcome"), OPTIONS.values(), ids=OPTIONS)
