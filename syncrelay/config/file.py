@@ -168,7 +168,7 @@ def _by_policy(groups: Mapping[str, type[Group]], any_group: type[Group]) -> Any
 
 
 # The value of a required key that is missing or faulty; of all others it is None.
-_UNKNOWN: Final[Mapping[str, Any]] = {"topic": ""}
+_UNKNOWN: Final[Mapping[str, Any]] = {"topic": "", "features": {}}
 
 
 def _partial(model: type[AnyKeys], **fields: Any) -> type[AnyKeys]:
@@ -183,12 +183,8 @@ def _partial_format_of(installed: Policies) -> type[FileKeys]:
     form = _format_of(installed)
     by_policy = {policy: _partial_group(model) for policy, model in form.groups.items()}
     group = _by_policy(by_policy, _partial_group(form.any_group))
-    return _partial(FileKeys, defaults=(Any, None), groups=(_dict_of(str, group), {}), export=(_partial_export(), None))
-
-
-def _partial_export() -> Any:
-    lerobot = _partial(LerobotKeys, features=(LerobotKeys.model_fields["features"].annotation, {}))
-    return _partial(ExportKeys, lerobot=(lerobot | None, None)) | None
+    export = _partial(ExportKeys, lerobot=(_partial(LerobotKeys) | None, None)) | None
+    return _partial(FileKeys, defaults=(Any, None), groups=(_dict_of(str, group), {}), export=(export, None))
 
 
 def _partial_group(model: type[Group]) -> type[Group]:

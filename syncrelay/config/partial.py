@@ -15,7 +15,7 @@ from syncrelay.config.problems import Path
 def partial_file(document: Document, errors: Sequence[ErrorDetails]) -> tuple[Document, FileKeys]:
     """Return the tree of a file that pydantic refused with its faulty keys marked, and the keys without them.
 
-    A required key that is missing is None, a topic's name empty.
+    A required key that is missing is None, a topic's name empty; of features there are none then.
     """
     # If only a group's name is refused, its keys are valid.
     locs = (error["loc"] for error in errors if error["loc"][2:] != ("[key]",))

@@ -80,8 +80,10 @@ def read_source(path: str, *, patience_s: float = PATIENCE_S) -> Source:
     except TimeoutError as error:
         late = f"could not be read to its end within {patience_s:g} s"
         raise _unreadable(path, f"{late}: is it a pipe that nobody writes to, or closes?") from error
+    except FileNotFoundError as error:
+        raise _unreadable(path, f"no such file{_similar_file(Path(path))}") from error
     except OSError as error:
-        raise _unreadable(path, _reason(path, error)) from error
+        raise _unreadable(path, f"cannot be read: {error.strerror}") from error
     except ValueError as error:
         raise _unreadable(path, "is not a file name") from error
     return decode(content, name=path)
@@ -157,14 +159,6 @@ def _lines(text: str) -> tuple[str, ...]:
 def _span_at(before: str) -> Span:
     lines = _lines(before)
     return Span(len(lines), len(lines[-1]) + 1, 1)
-
-
-def _reason(path: str, error: OSError) -> str:
-    match error:
-        case FileNotFoundError():
-            return f"no such file{_similar_file(Path(path))}"
-        case _:
-            return f"cannot be read: {error.strerror}"
 
 
 def _similar_file(path: Path) -> str:
