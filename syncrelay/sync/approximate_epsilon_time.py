@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
-from syncrelay.sync.policy import Queued, check_sizes
-from syncrelay.sync.queues import Losses, StampQueue
+from syncrelay.sync.policy import Queued
 
 
 class ApproximateEpsilonTime(Queued):
@@ -26,14 +25,10 @@ class ApproximateEpsilonTime(Queued):
     __slots__ = ("_epsilon", "_losses", "_queue_size", "_queues", "n_inputs")
 
     def __init__(self, *, n_inputs: int, queue_size: int, epsilon_ns: int) -> None:
-        check_sizes(n_inputs, queue_size)
+        self.make_queues(n_inputs, queue_size)
         if epsilon_ns < 0:
             raise ValueError(f"epsilon_ns {epsilon_ns} must be 0 or more")
-        self.n_inputs = n_inputs
-        self._queue_size = queue_size
         self._epsilon = epsilon_ns
-        self._queues = [StampQueue() for _ in range(n_inputs)]
-        self._losses = Losses(n_inputs)
 
     def for_required(self, required: Sequence[bool]) -> tuple["ApproximateEpsilonTime", OptionalInputs]:
         size, epsilon = self._queue_size, self._epsilon

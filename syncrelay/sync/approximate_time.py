@@ -5,8 +5,7 @@ from collections.abc import Sequence
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
-from syncrelay.sync.policy import Queued, check_sizes, of_required
-from syncrelay.sync.queues import Losses, StampQueue
+from syncrelay.sync.policy import Queued, of_required
 
 _NO_PIVOT = -1
 
@@ -69,22 +68,18 @@ class ApproximateTime(Queued):
         min_periods_ns: Sequence[int] | None = None,
     ) -> None:
         periods = (0,) * n_inputs if min_periods_ns is None else tuple(min_periods_ns)
-        check_sizes(n_inputs, queue_size)
+        self.make_queues(n_inputs, queue_size)
         if slop_ns < 0 or not 0 <= age_penalty < float("inf"):
             raise ValueError(f"slop_ns {slop_ns} and age_penalty {age_penalty} must be 0 or more")
         if len(periods) != n_inputs or min(periods) < 0:
             raise ValueError(f"min_periods_ns {periods} must be {n_inputs} numbers, 0 or more")
-        self.n_inputs = n_inputs
-        self._queue_size = queue_size
         self._slop = slop_ns
         self._age_penalty = age_penalty
         self._scale = (1.0 + age_penalty).as_integer_ratio()
         self._min_periods = periods
-        self._queues = [StampQueue() for _ in periods]
         # The search works on the lists themselves.
         self._stamps = [queue.stamps for queue in self._queues]
         self._messages = [queue.messages for queue in self._queues]
-        self._losses = Losses(n_inputs)
         # (stamp, place) of the head of each input that has one, the earliest first.
         self._heads: list[tuple[int, int]] = []
         self.waits_started = 0

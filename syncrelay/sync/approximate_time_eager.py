@@ -5,8 +5,7 @@ from collections.abc import Sequence
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
-from syncrelay.sync.policy import Queued, check_sizes
-from syncrelay.sync.queues import Losses, StampQueue
+from syncrelay.sync.policy import Queued
 
 
 class ApproximateTimeEager(Queued):
@@ -29,15 +28,11 @@ class ApproximateTimeEager(Queued):
     __slots__ = ("_losses", "_queue_size", "_queues", "_slop", "_stamps", "n_inputs")
 
     def __init__(self, *, n_inputs: int, queue_size: int, slop_ns: int) -> None:
-        check_sizes(n_inputs, queue_size)
+        self.make_queues(n_inputs, queue_size)
         if slop_ns < 0:
             raise ValueError(f"slop_ns {slop_ns} must be 0 or more")
-        self.n_inputs = n_inputs
-        self._queue_size = queue_size
         self._slop = slop_ns
-        self._queues = [StampQueue() for _ in range(n_inputs)]
         self._stamps = [queue.stamps for queue in self._queues]
-        self._losses = Losses(n_inputs)
 
     def for_required(self, required: Sequence[bool]) -> tuple["ApproximateTimeEager", OptionalInputs]:
         size, slop = self._queue_size, self._slop

@@ -45,7 +45,8 @@ class Ledger:
                 if self._repeats:
                     self._note_repeated(outcome)
                 elif not all(outcome.messages):
-                    self._note_absent(outcome)
+                    for index, message in enumerate(outcome.messages):
+                        self._absent[index] += message is None
             else:
                 self._dropped[outcome.message.input][outcome.reason] += 1
 
@@ -60,11 +61,6 @@ class Ledger:
             InputCounts(fed, self.sets - absent, dict(dropped), held, needed)
             for fed, absent, dropped, held, needed in rows
         )
-
-    def _note_absent(self, match: Match) -> None:
-        for index, message in enumerate(match.messages):
-            if message is None:
-                self._absent[index] += 1
 
     def _note_repeated(self, match: Match) -> None:
         for index, message in enumerate(match.messages):

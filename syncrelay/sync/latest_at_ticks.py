@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from syncrelay.sync.latest_time import check_max_ages
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
-from syncrelay.sync.policy import Queued, check_sizes
-from syncrelay.sync.queues import Losses, StampQueue
+from syncrelay.sync.policy import Queued
 from syncrelay.sync.ticks import Ticks
 
 REST_NS = 10_000_000_000
@@ -71,17 +70,13 @@ class LatestAtTicks(Queued):
         max_ages_ns: Sequence[int | None] | None = None,
         required: Sequence[bool] | None = None,
     ) -> None:
-        check_sizes(n_inputs, queue_size)
+        self.make_queues(n_inputs, queue_size)
         needed = (True,) * n_inputs if required is None else tuple(required)
         if len(needed) != n_inputs or not any(needed):
             raise ValueError(f"required {needed} must be {n_inputs}, one required")
-        self.n_inputs = n_inputs
         self.ticks = ticks
-        self._queue_size = queue_size
         self._max_ages = check_max_ages(max_ages_ns, n_inputs)
         self._required = needed
-        self._queues = [StampQueue() for _ in needed]
-        self._losses = Losses(n_inputs)
         # The last tick that has passed, the time that was reached, and the time when the last message was fed.
         self._passed = -1
         self._until = 0

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
-from syncrelay.sync.policy import Queued, check_sizes
-from syncrelay.sync.queues import Losses, StampQueue
+from syncrelay.sync.policy import Queued
 
 
 def check_max_ages(max_ages_ns: Sequence[int | None] | None, n_inputs: int) -> tuple[int | None, ...]:
@@ -69,17 +68,13 @@ class LatestTime(Queued):
         max_ages_ns: Sequence[int | None] | None = None,
         required: Sequence[bool] | None = None,
     ) -> None:
-        check_sizes(n_inputs, queue_size)
+        self.make_queues(n_inputs, queue_size)
         needed = (True,) * n_inputs if required is None else tuple(required)
         if not 0 <= trigger < n_inputs or len(needed) != n_inputs or not needed[trigger]:
             raise ValueError(f"trigger {trigger} must be a required input of {n_inputs}: {needed}")
-        self.n_inputs = n_inputs
-        self._queue_size = queue_size
         self._trigger = trigger
         self._max_ages = check_max_ages(max_ages_ns, n_inputs)
         self._required = needed
-        self._queues = [StampQueue() for _ in needed]
-        self._losses = Losses(n_inputs)
         self.waits_started = 0
         self.waits_ended = 0
 

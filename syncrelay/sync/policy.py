@@ -88,10 +88,17 @@ class Policy(Protocol):
 class Queued(Policy, Protocol):
     """A policy that keeps the messages of each input in a queue."""
 
-    __slots__ = ()
-
-    _queues: Sequence[StampQueue]
+    _queue_size: int
+    _queues: list[StampQueue]
     _losses: Losses
+
+    def make_queues(self, n_inputs: int, queue_size: int) -> None:
+        """Have an empty queue for each input. Raises ValueError for sizes that no policy can have."""
+        check_sizes(n_inputs, queue_size)
+        self.n_inputs = n_inputs
+        self._queue_size = queue_size
+        self._queues = [StampQueue() for _ in range(n_inputs)]
+        self._losses = Losses(n_inputs)
 
     def flush(self, reason: DropReason) -> list[Drop]:
         self._losses.forget()

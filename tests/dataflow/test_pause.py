@@ -75,30 +75,10 @@ def test_a_latest_message_outlives_a_pause_be_it_from_before_or_from_within():
     assert [dict(each.dropped) for each in group.counts()] == [{DropReason.PAUSED: 1}] * 2
 
 
-def test_a_group_that_is_suspended_while_paused_stays_paused():
-    group, outlets = _group()
-    group.pause()
-    group.suspend()
-    for index in range(2):
-        _give(group, index, 0)
-    connect(group, outlets)
-    group.resume()
-    assert _sent(outlets) == [[], []]
-    assert [dict(each.dropped) for each in group.counts()] == [{DropReason.PAUSED: 1}] * 2
-
-
-def test_a_group_that_failed_is_paused_and_goes_on_as_one_that_failed():
-    group, _ = _group()
-    group.fail(ZeroDivisionError("x"))
-    group.pause()
-    group.unpause()
-    _give(group, 0, 0)
-    assert group.failure == "ZeroDivisionError: x"
-
-
 _STEPS = st.lists(
     st.one_of(
-        st.tuples(st.integers(0, 2), st.integers(-25, 10)), st.sampled_from(["pause", "unpause", "suspend", "expire"])
+        st.tuples(st.integers(0, 2), st.integers(-25, 10)),
+        st.sampled_from(["pause", "unpause", "suspend", "expire", "fail"]),
     ),
     max_size=80,
 )
@@ -112,6 +92,8 @@ def _take(step: str | tuple[int, int], group: GroupRelay, outlets: list[Outlet],
             group.resume()
         case "expire":
             group.expire(at * MS)
+        case "fail":
+            group.fail(ZeroDivisionError("x"))
         case str():
             getattr(group, step)()
         case index, ahead:
@@ -143,13 +125,13 @@ def test_ticks_of_a_pause_give_no_sets_and_what_came_in_it_serves_those_after():
 
 
 @given(policy=st.sampled_from(sorted(_KINDS)), steps=_STEPS, optional=st.booleans())
-def test_all_is_counted_nothing_leaves_while_paused_and_no_set_goes_back(policy, steps, optional):
+def test_all_is_counted_nothing_leaves_while_paused_or_once_it_failed_and_no_set_goes_back(policy, steps, optional):
     keys = {"policy": policy, **_KINDS[policy], **({"max_wait": "5ms", "topics": _WITH_RADAR} if optional else {})}
     group, outlets = _group(**keys)
     for at, step in enumerate(steps):
         before = _sent(outlets)
         _take(step, group, outlets, at)
-        if group.paused_since is not None:
+        if group.paused_since is not None or group.failure is not None:
             assert _sent(outlets) == before
         for each in group.counts():
             assert each.fed == each.matched + sum(each.dropped.values()) + each.buffered

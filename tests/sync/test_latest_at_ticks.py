@@ -164,15 +164,6 @@ def test_an_hour_in_which_nothing_came_costs_no_work_and_gives_no_more_sets_than
     assert match.stamps == (at(hour), at(0))
 
 
-def test_ticks_of_the_time_before_the_first_message_give_no_sets():
-    group = by_clock(max_wait=10)
-    assert group.expire(now=at(0)) == []
-    for index in range(2):
-        assert not sets_of(group.add(message(index, 20), now=at(1000)))
-    # Those from 900 ms on are still waited for.
-    assert [match.tick for match in sets_of(group.expire(now=at(1100)))] == [at(950), at(1000)]
-
-
 def test_no_tick_comes_twice_when_the_clock_is_corrected_and_all_come_again_when_it_starts_again():
     group = by_clock()
     for index in range(2):
@@ -185,14 +176,6 @@ def test_no_tick_comes_twice_when_the_clock_is_corrected_and_all_come_again_when
     for index in range(2):
         group.add(message(index, 10), now=at(20))
     assert [match.tick for match in group.expire(now=at(100))] == [at(50), at(100)]
-
-
-def test_time_that_is_passed_over_gives_no_sets():
-    group = by_clock()
-    for index in range(2):
-        group.add(message(index, 0), now=at(0))
-    group.pass_over(now=at(100))
-    assert [match.tick for match in group.expire(now=at(200))] == [at(150), at(200)]
 
 
 def test_what_is_let_go_is_all_but_the_latest_of_each_input():
