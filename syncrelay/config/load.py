@@ -2,6 +2,7 @@
 
 import json
 import os
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -65,11 +66,12 @@ def load(
 ) -> Config:
     """Read a file (`-` is standard input), or several files or directories as one configuration.
 
-    Together they have the groups of all and one `node`; `defaults` are for the groups of their own file. A pipe
-    is waited for so many seconds. Raises ConfigError with everything that is wrong.
+    Together they have the groups of all and one `node`; `defaults` are for the groups of their own file. All pipes
+    together are waited for so many seconds. Raises ConfigError with everything that is wrong.
     """
     files = (file for path in paths for file in yaml_files(path))
-    reads = [partial(read_source, file, patience_s=patience_s) for file in files]
+    read = partial(read_source, patience_s=patience_s, since=time.monotonic())
+    reads = [partial(read, file) for file in files]
     return _config(_parts(reads, environ), environ)
 
 

@@ -66,17 +66,19 @@ def shown_name(path: str) -> str:
     return "<stdin>" if path == STDIN else path or "''"
 
 
-def read_source(path: str, *, patience_s: float = PATIENCE_S) -> Source:
+def read_source(path: str, *, patience_s: float = PATIENCE_S, since: float | None = None) -> Source:
     """Return the text of a file, `-` for standard input, which alone is waited for without end.
 
-    A pipe is waited for so many seconds. Raises ConfigError where there is no text.
+    A pipe is waited for so many seconds, counted from `since` on the monotonic clock, by default from now. Raises
+    ConfigError where there is no text.
     """
+    until = (time.monotonic() if since is None else since) + patience_s
     if path == STDIN:
         return decode(sys.stdin.buffer.read(_MOST_BYTES + 1), name=shown_name(path))
     if not path:
         raise _unreadable(shown_name(path), "is not a file name")
     try:
-        content = _content(path, patience_s)
+        content = _content(path, until=until)
     except TimeoutError as error:
         late = f"could not be read to its end within {patience_s:g} s"
         raise _unreadable(path, f"{late}: is it a pipe that nobody writes to, or closes?") from error
@@ -89,7 +91,7 @@ def read_source(path: str, *, patience_s: float = PATIENCE_S) -> Source:
     return decode(content, name=path)
 
 
-def _content(path: str, patience_s: float) -> bytes:
+def _content(path: str, *, until: float) -> bytes:
     """Return a file's bytes, at most one more than allowed. Raises TimeoutError for a pipe that does not end."""
     kind = _NO_FILES.get(stat.S_IFMT(Path(path).stat().st_mode))
     if kind == "directory" and len(files := files_of(path)) > MOST_FILES:
@@ -101,7 +103,7 @@ def _content(path: str, patience_s: float) -> bytes:
         raise _unreadable(path, f"is a {kind}, expected a YAML file")
     # A blocking open of a FIFO waits for a writer, without a limit.
     with FileIO(path, opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
-        return _read(file, until=time.monotonic() + patience_s)
+        return _read(file, until=until)
 
 
 def _read(file: FileIO, *, until: float) -> bytes:

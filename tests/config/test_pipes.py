@@ -2,6 +2,7 @@
 
 import os
 import socket
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from syncrelay.config import ConfigError, load
+from syncrelay.config.source import Source, read_source
 from tests.cli.command import GOOD
 
 _NO_END = "could not be read to its end within 0.2 s: is it a pipe that nobody writes to, or closes?"
@@ -40,6 +42,26 @@ def text_of(path: Path | str, *, patience_s: float = 0.2) -> str:
 
 def test_a_pipe_that_nobody_writes_to_is_given_up(fifo: Path):
     assert text_of(fifo) == f"{fifo}: {_NO_END}"
+
+
+def test_pipes_that_are_read_together_are_waited_for_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """They are given up one after another, without a wait for each; what is written to others is read all the same."""
+    begun: list[float] = []
+
+    def noted(path: str, *, patience_s: float, since: float) -> Source:
+        begun.append(since)
+        return read_source(path, patience_s=patience_s, since=since)
+
+    monkeypatch.setattr(sys.modules["syncrelay.config.load"], "read_source", noted)
+    for number in range(20):
+        os.mkfifo(tmp_path / f"{number:02}.yaml")
+    assert text_of(tmp_path).count(_NO_END) == 20
+    assert begun == [begun[0]] * 20
+    read_end, written = os.pipe()
+    os.write(written, b"version: 1")
+    os.close(written)
+    assert read_source(f"/dev/fd/{read_end}", patience_s=0.2, since=begun[0]).text == "version: 1"
+    os.close(read_end)
 
 
 @pytest.mark.parametrize("content", ["", GOOD])
