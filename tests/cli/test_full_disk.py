@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +12,7 @@ import yaml
 from tests.cli.command import GOOD, ROOT, run_here
 from tests.cli.full_disk import COMMANDS
 from tests.cli.test_export_lerobot import FILE
+from tests.doctor.environments import namespaces
 from tests.recordings.bag.making import rig, write_mcap
 from tests.recordings.datasets.drives import drive
 from tests.ros.cdr_messages import VECTOR
@@ -20,7 +20,7 @@ from tests.ros.cdr_messages import VECTOR
 _LONG = os.environ.get("SYNCRELAY_FAULTS") == "long"
 _SIZES = 20 if _LONG else 3
 _SEED = os.urandom(4).hex() if _LONG else "full disk"
-_UNSHARE = ("unshare", "--mount", "--map-root-user")
+_MOUNTS = ("--mount", "--map-root-user")
 # Slop is too small, so that there are values to suggest.
 _FUSION = {
     "policy": "approximate_time",
@@ -31,14 +31,13 @@ _FUSION = {
 
 @pytest.fixture(scope="module")
 def told(tmp_path_factory):
-    if not shutil.which("unshare") or subprocess.run([*_UNSHARE, "true"], capture_output=True, check=False).returncode:
-        pytest.skip("this machine gives no mounts of its own")
+    mounts = namespaces(*_MOUNTS)
     folder = tmp_path_factory.mktemp("full")
     write_mcap(folder / "rig.mcap", rig(400))
     drive(folder / "drive.mcap")
     (folder / "lerobot.yaml").write_text(FILE)
     (folder / "fusion.yaml").write_text(yaml.safe_dump({"version": 1, "groups": {"front": _FUSION}}))
-    argv = [*_UNSHARE, sys.executable, "-m", "tests.cli.full_disk", _SEED, str(_SIZES), str(folder)]
+    argv = [*mounts, sys.executable, "-m", "tests.cli.full_disk", _SEED, str(_SIZES), str(folder)]
     done = subprocess.run(argv, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
@@ -75,12 +74,10 @@ def test_talk_that_finds_no_space_is_no_failure(tmp_path):
 
 
 def test_a_relative_name_is_written_where_another_folder_was_mounted_over_the_working_one(tmp_path):
-    if not shutil.which("unshare") or subprocess.run([*_UNSHARE, "true"], capture_output=True, check=False).returncode:
-        pytest.skip("this machine gives no mounts of its own")
     (tmp_path / "here").mkdir()
     (tmp_path / "over").mkdir()
     script = f'mount --bind ../over . && exec "{sys.executable}" -m syncrelay demo --seconds 1 --record rig.mcap'
-    argv = [*_UNSHARE, "bash", "-c", script]
+    argv = [*namespaces(*_MOUNTS), "bash", "-c", script]
     done = subprocess.run(argv, cwd=tmp_path / "here", capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "over" / "rig.mcap").exists()

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.doctor.environments import namespaces
 from tests.ros.processes import Process, ros_environment
 
 # What hangs is begun only when the signals are in hand.
@@ -159,11 +160,8 @@ def test_of_pid_1_too_a_second_signal_right_after_the_first_is_the_same_request(
 
 
 def _run_as_pid_1(script: str, *words: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    unshare = ["unshare", "--pid", "--fork", "--kill-child", "--map-root-user"]
-    done = _run([*unshare, sys.executable, "-c", script, *words], folder)
-    if "unshare" in done.stderr:
-        pytest.skip(f"no process namespace can be made here: {done.stderr}")
-    return done
+    first = namespaces("--pid", "--fork", "--kill-child", "--map-root-user")
+    return _run([*first, sys.executable, "-c", script, *words], folder)
 
 
 def _run(argv: list[str], folder: Path) -> subprocess.CompletedProcess[str]:

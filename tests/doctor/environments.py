@@ -43,12 +43,18 @@ def distribution(site, name, version, *requires):
     (folder / "METADATA").write_text("\n".join([*lines, *(f"Requires-Dist: {each}" for each in requires)]) + "\n")
 
 
-def unshared(namespaces, script, *words):
-    """The command for syncrelay with Linux namespaces of its own, behind the lines of a shell script as root."""
-    flags = [f"--{namespace}" for namespace in namespaces]
+def namespaces(*flags):
+    """What comes before a command that gets Linux namespaces of its own."""
     program = shutil.which("unshare")
     tried = program and subprocess.run([program, *flags, "true"], capture_output=True, check=False)
-    if not tried or tried.returncode or not shutil.which("ip"):
-        pytest.skip("this machine gives no namespaces of its own, or has no iproute2")
+    if not tried or tried.returncode:
+        pytest.skip("this machine gives no namespaces of its own")
+    return [program, *flags]
+
+
+def unshared(names, script, *words):
+    """The command for syncrelay with these namespaces of its own, behind the lines of a shell script as root."""
+    if not shutil.which("ip"):
+        pytest.skip("this machine has no iproute2")
     command = [sys.executable, "-m", "syncrelay", *words]
-    return [program, *flags, "sh", "-ec", f'{script}\nexec "$@"', "sh", *command]
+    return [*namespaces(*(f"--{name}" for name in names)), "sh", "-ec", f'{script}\nexec "$@"', "sh", *command]
