@@ -64,7 +64,7 @@ def _metadata(word: str) -> _Found | None:
         if url is None:
             return None
         with closing(RemoteFile(url)) as remote:
-            content = remote.read(min(LARGEST + 1, remote.size))
+            content = remote.read(0, min(LARGEST + 1, remote.size))
         return _Found(content, [PurePosixPath(each).name for each in files_of(word)])
     folder = Path(word).parent if Path(word).name == METADATA else Path(word)
     if not (folder / METADATA).is_file():

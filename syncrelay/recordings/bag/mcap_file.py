@@ -94,16 +94,11 @@ class McapFile:
 
     def _content(self, segment: Segment) -> bytes:
         if segment not in self._index.chunked:
-            return self._bytes(segment.offset, segment.size)
-        opcode, length = RECORD.unpack(self._bytes(segment.offset, RECORD.size))
+            return self._file.read(segment.offset, segment.size)
+        opcode, length = RECORD.unpack(self._file.read(segment.offset, RECORD.size))
         if opcode != Opcode.CHUNK or length != segment.size - RECORD.size:
             raise ValueError("it does not match the index")
-        return unpacked(parsed(Chunk, self._file.read(length)), self._effort)
-
-    def _bytes(self, place: int, size: int) -> bytes:
-        """Read bytes that are known to be in the file."""
-        self._file.seek(place)
-        return self._file.read(size)
+        return unpacked(parsed(Chunk, self._file.read(segment.offset + RECORD.size, length)), self._effort)
 
 
 def open_mcap(source: Source, name: str) -> McapFile:

@@ -105,13 +105,13 @@ class McapIndex:
         # This usually fetches the whole summary together with the footer.
         tail = max(len(MAGIC), self._size - _TAIL)
         self._file.expect([(tail, self._size - tail)])
-        head, footer = self._bytes(end, RECORD.size), self._bytes(end + RECORD.size, _FOOTER.size)
+        head, footer = self._file.read(end, RECORD.size), self._file.read(end + RECORD.size, _FOOTER.size)
         begin, _, checksum = _FOOTER.unpack(footer)
         has_footer = head == RECORD.pack(Opcode.FOOTER, _FOOTER.size)
         if not has_footer or not len(MAGIC) <= begin < end or end - begin > _LONGEST_SUMMARY:
             raise ValueError("there is no summary")
         self._file.expect([(begin, self._size - begin)])
-        summary = self._bytes(begin, end - begin)
+        summary = self._file.read(begin, end - begin)
         if checksum not in (0, zlib.crc32(head + footer[:-_CHECKSUM_SIZE], zlib.crc32(summary))):
             raise ValueError("its checksum is wrong")
         count = expected = 0
@@ -138,7 +138,7 @@ class McapIndex:
         """Read the content of a record that describes something; raises ValueError if it is too large for that."""
         if end - begin > _LONGEST_TEXT:
             raise ValueError(f"{end - begin} bytes are no description")
-        return self._bytes(begin, end - begin)
+        return self._file.read(begin, end - begin)
 
     def _scan(self) -> None:
         """Find channels and segments by going through the file, as far as it can be read."""
@@ -150,7 +150,7 @@ class McapIndex:
         try:
             while place < self._size:
                 begin = place + RECORD.size
-                opcode, length = RECORD.unpack(self._bytes(place, RECORD.size))
+                opcode, length = RECORD.unpack(self._file.read(place, RECORD.size))
                 require_record(opcode)
                 if begin + length > self._size:
                     raise EOFError("a record ends past the end")
@@ -174,7 +174,7 @@ class McapIndex:
                     self._define(opcode, self._text(begin, end))
                 case Opcode.MESSAGE:
                     self._effort.found_message()
-                    time = int.from_bytes(self._bytes(begin, min(MESSAGE_FIELDS, end - begin))[6:14], "little")
+                    time = int.from_bytes(self._file.read(begin, min(MESSAGE_FIELDS, end - begin))[6:14], "little")
                     loose.add(Segment(place, end - place, time, time))
                 case Opcode.CHUNK:
                     self._note_chunk(Segment(place, end - place, 0, 0))
@@ -182,7 +182,7 @@ class McapIndex:
             self._losses.damaged(f"the {Opcode(opcode).name.lower()} at byte {place}", fault)
 
     def _note_chunk(self, record: Segment) -> None:
-        chunk = parsed(Chunk, self._bytes(record.offset + RECORD.size, record.size - RECORD.size))
+        chunk = parsed(Chunk, self._file.read(record.offset + RECORD.size, record.size - RECORD.size))
         content = unpacked(chunk, self._effort)
         segment = Segment(record.offset, record.size, chunk.message_start_time, chunk.message_end_time)
         self.segments.append(segment)
@@ -210,8 +210,3 @@ class McapIndex:
         else:
             channel = parsed(ChannelRecord, content)
             self.channels[channel.id] = channel
-
-    def _bytes(self, place: int, size: int) -> bytes:
-        """Read bytes that are known to be in the file."""
-        self._file.seek(place)
-        return self._file.read(size)

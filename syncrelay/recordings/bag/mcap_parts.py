@@ -76,7 +76,7 @@ class Parts:
         spans = self._spans.pop(segment, None)
         if spans is None:
             return None
-        records = [self._bytes(begin, size) for begin, size in spans]
+        records = [self._source.read(begin, size) for begin, size in spans]
         are_wanted = (
             record[:1] == bytes([Opcode.MESSAGE]) and int.from_bytes(record[_NUMBER], "little") in self._wanted
             for record in records
@@ -99,7 +99,7 @@ class Parts:
 
     def _looked_up(self, chunk: PlainChunk) -> Iterator[Span]:
         """Yield the place of each wanted message of a chunk, up to the next message; raises one of UNREADABLE."""
-        content = self._bytes(chunk.end, chunk.index_end - chunk.end)
+        content = self._source.read(chunk.end, chunk.index_end - chunk.end)
         size = chunk.end - chunk.begin
         places: list[int] = []
         wanted: list[int] = []
@@ -119,7 +119,3 @@ class Parts:
         for offset in sorted(set(wanted)):
             following = places[bisect_right(places, offset)]
             yield chunk.begin + offset, following - offset
-
-    def _bytes(self, place: int, size: int) -> bytes:
-        self._source.seek(place)
-        return self._source.read(size)

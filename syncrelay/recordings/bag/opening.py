@@ -152,7 +152,7 @@ def _open_remote(url: str, opened: ExitStack, faults: list[str], tell: Tell) -> 
     why = "its format is read from a file of this machine"
     if not remote.has_ranges:
         why = "its server cannot send parts of it"
-    elif remote.read(_LONGEST_MAGIC).startswith(mcap_index.MAGIC):
+    elif remote.read(0, _LONGEST_MAGIC).startswith(mcap_index.MAGIC):
         try:
             return mcap_file.open_mcap(remote, remote.name)
         except NoIndexError:

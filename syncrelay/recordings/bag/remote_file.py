@@ -53,25 +53,19 @@ class RemoteFile:
         self.size = int(self._about["size"])
         self._fetch_range = _fetcher(self._files, self._path, self._about, url)
         self.has_ranges = scheme_of(url) not in SERVERS or self._sends_ranges()
-        self._place = 0
         self._held: deque[tuple[int, bytes]] = deque(maxlen=_HELD)
         self._windows: list[Span] = []
         self._by_place: list[tuple[int, int]] = []
         self._coming: dict[int, Future[bytes]] = {}
 
-    def seek(self, place: int, /) -> int:
+    def read(self, place: int, size: int) -> bytes:
         """See Source."""
-        self._place = place
-        return place
-
-    def read(self, size: int, /) -> bytes:
-        """See Source."""
-        end = min(self._place + size, self.size)
+        end = min(place + size, self.size)
         parts = []
-        while self._place < end:
-            begin, held = self._holding(end)
-            part = held[self._place - begin : end - begin]
-            self._place += len(part)
+        while place < end:
+            begin, held = self._holding(place, end)
+            part = held[place - begin : end - begin]
+            place += len(part)
             parts.append(part)
         return parts[0] if len(parts) == 1 else b"".join(parts)
 
@@ -125,14 +119,12 @@ class RemoteFile:
                 raise StorageError(f"{self.name}: {path.stat().st_size:,} of {self.size:,} bytes came")
             return
         with path.open("wb") as file:
-            self.seek(0)
             self.expect([(0, self.size)])
-            while piece := self.read(_AT_ONCE):
-                file.write(piece)
+            for place, size in self._windows:
+                file.write(self.read(place, size))
 
-    def _holding(self, asked: int) -> tuple[int, bytes]:
-        """Return bytes that contain the present offset, and where they begin."""
-        place = self._place
+    def _holding(self, place: int, asked: int) -> tuple[int, bytes]:
+        """Return bytes that contain an offset, and where they begin."""
         for each in self._held:
             if each[0] <= place < each[0] + len(each[1]):
                 return each

@@ -20,11 +20,8 @@ class Source(Protocol):
     is_near: bool
     """Whether the file is local, so that reading all of it is cheap."""
 
-    def seek(self, place: int, /) -> object:
-        """Set the offset of the next read."""
-
-    def read(self, size: int, /) -> bytes:
-        """Return the next `size` bytes; fewer only at the end of the file."""
+    def read(self, place: int, size: int) -> bytes:
+        """Return `size` bytes from an offset; fewer only at the end of the file."""
 
     def expect(self, spans: Sequence[Span]) -> None:
         """Announce what is read next, in this order, so that it can be fetched ahead and in few requests."""
@@ -41,9 +38,12 @@ class LocalFile:
     def __init__(self, path: Path) -> None:
         self._file = path.open("rb")
         self.size = os.fstat(self._file.fileno()).st_size
-        self.seek = self._file.seek
-        self.read = self._file.read
         self.close = self._file.close
+
+    def read(self, place: int, size: int) -> bytes:
+        """See Source."""
+        self._file.seek(place)
+        return self._file.read(size)
 
     def expect(self, spans: Sequence[Span]) -> None:
         """See Source. The operating system reads ahead by itself."""

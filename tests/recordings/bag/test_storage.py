@@ -209,9 +209,8 @@ def test_what_stays_wrong_is_tried_so_often_and_then_said(fault, why, server):
     remote = RemoteFile(server.url("/rig.mcap?X-Amz-Signature=hush"))
     server.fault = lambda _: fault
     server.forget()
-    remote.seek(10)
     with pytest.raises(StorageError) as raised:
-        remote.read(10)
+        remote.read(10, 10)
     assert str(raised.value).startswith(f"{server.url('/rig.mcap')}?...: {why}")
     assert "(5 attempts): try again later" in str(raised.value)
 
@@ -298,7 +297,7 @@ def test_to_tell_and_to_complete_a_word_nothing_is_fetched(server):
     assert is_recording(url)
     assert is_recording("s3://bucket/day/")
     assert not is_recording("/camera/image")
-    assert list(COMPLETERS["BAG|TOPIC"](f"{url}/x", Namespace(bag=url, more=[]))) == []
+    assert list(COMPLETERS["BAG|TOPIC"](prefix=f"{url}/x", parsed_args=Namespace(bag=url, more=[]))) == []
     assert find(url) == [url]
     assert server.requests == []
 
@@ -380,8 +379,7 @@ def test_whatever_is_planned_what_is_read_is_what_is_there(planned: Sequence, ot
     remote._fetch_range = counted  # noqa: SLF001
     remote.expect(planned)
     for begin, size in chain.from_iterable(zip(planned, others, strict=False)):
-        remote.seek(begin)
-        assert remote.read(size) == _CONTENT[begin : begin + size]
+        assert remote.read(begin, size) == _CONTENT[begin : begin + size]
     allowed = [*planned, *others]
     for begin, end in asked:
         # At most what lies between two parts that stand close together.
