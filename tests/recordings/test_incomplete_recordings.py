@@ -12,16 +12,14 @@ from rosbags.rosbag2 import CompressionMode
 
 from tests.cli.command import run, run_here
 from tests.faults.extent import chosen
-from tests.recordings.bag.making import rig, write_mcap, write_rosbag2
+from tests.recordings.bag.making import rig, rig_file, write_mcap, write_rosbag2
 from tests.ros.cdr_messages import VECTOR
-from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
 
 pytestmark = pytest.mark.faults
 
 COUNT = chosen(short=14, long=300)
 SEED = 28
-GROUP = {"policy": "approximate_time", "slop": "5ms", "topics": inputs({"/camera": VECTOR, "/lidar": VECTOR})}
 LEROBOT = {"fps": 10, "task": "drive", "max_gap": "60s", "features": {"action": "/camera:vector"}}
 
 
@@ -133,8 +131,8 @@ def _split(folder: Path, chance: random.Random) -> tuple[list[Path], str]:
 def folder(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("incomplete")
     (folder / "bags").mkdir()
-    (folder / "f.yaml").write_text(config({"front": GROUP}))
-    exported = json.loads(config({"front": GROUP})) | {"export": {"lerobot": LEROBOT}}
+    (folder / "f.yaml").write_text(rig_file())
+    exported = json.loads(rig_file()) | {"export": {"lerobot": LEROBOT}}
     (folder / "lerobot.yaml").write_text(json.dumps(exported))
     return folder
 

@@ -8,22 +8,11 @@ import pyarrow.parquet
 import pytest
 
 from tests.cli.command import run, run_python
-from tests.recordings.bag.making import rig, write_mcap
-from tests.ros.cdr_messages import VECTOR
+from tests.recordings.bag.making import rig, rig_file, write_mcap
 
 pytest.importorskip("fsspec", reason="the extra `fleet` is not installed")
 pytestmark = pytest.mark.process
 
-_CONFIG = f"""\
-version: 1
-groups:
-  rig:
-    policy: approximate_time
-    slop: 10ms
-    topics:
-      - {{topic: /camera, type: {VECTOR}}}
-      - {{topic: /lidar, type: {VECTOR}}}
-"""
 # As a bucket: it has no folders of its own, and `wrong` files are refused so often; it is full where that is negative.
 _STORE = """
 import shutil, sys
@@ -63,7 +52,7 @@ sys.exit(main(sys.argv[3:]))
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    (tmp_path / "f.yaml").write_text(_CONFIG)
+    (tmp_path / "f.yaml").write_text(rig_file("rig"))
     (tmp_path / "store").mkdir()
     write_mcap(tmp_path / "rig.mcap", rig())
     return tmp_path

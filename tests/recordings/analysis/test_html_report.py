@@ -17,9 +17,9 @@ from syncrelay.status.fates import CODES, FATES, MATCHED, UNNEEDED
 from syncrelay.sync import DropReason
 from tests.cli.command import run_here
 from tests.recordings.analysis.html_reports import analyzed, drawings_in, drive, unpacked
-from tests.recordings.bag.making import rig, write_mcap
+from tests.recordings.bag.making import rig, rig_file, write_mcap
 from tests.ros.cdr_messages import VECTOR, vector
-from tests.ros.configs import config, inputs
+from tests.ros.configs import inputs
 
 _SECOND = 1_000_000_000
 _NEVER = 10**9
@@ -173,12 +173,7 @@ def test_nothing_is_fetched_from_anywhere(analysis):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("command")
-    group = {
-        "policy": "approximate_time",
-        "slop": "1ms",
-        "topics": inputs(dict.fromkeys(("/camera", "/lidar"), VECTOR)),
-    }
-    (made / "f.yaml").write_text(config({"front": group}))
+    (made / "f.yaml").write_text(rig_file(slop="1ms"))
     write_mcap(made / "rig.mcap", rig(100))
     return made
 

@@ -12,7 +12,8 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from tests.ros.cdr_messages import NS_PER_SECOND, STORE
+from tests.ros.cdr_messages import NS_PER_SECOND, STORE, VECTOR
+from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
 from tests.ros.streams import MS, at
 
@@ -42,6 +43,12 @@ def rig(count: int = 40) -> list[Frame]:
     """A camera and a lidar, 3 ms apart, received a little after their stamps."""
     frames = at("/camera", *(100 * n + 3 for n in range(count))) + at("/lidar", *(100 * n for n in range(count)))
     return sorted((frame._replace(time=frame.time + 5 * MS) for frame in frames), key=lambda frame: frame.time)
+
+
+def rig_file(name: str = "front", **keys: Any) -> str:
+    """A file that matches the rig's camera and lidar."""
+    topics = inputs({"/camera": VECTOR, "/lidar": VECTOR})
+    return config({name: {"policy": "approximate_time", "slop": "5ms", "topics": topics, **keys}})
 
 
 def write_mcap(

@@ -21,13 +21,14 @@ from tests.recordings.bag.making import (
     CUSTOM_TEXT,
     blip,
     rig,
+    rig_file,
     write_mcap,
     write_ros1,
 )
 from tests.recordings.bag.making import write_rosbag2 as write_folder
 from tests.recordings.bag.reading import bound
 from tests.ros.cdr_messages import STORE, VECTOR, stamp_of, with_stamp
-from tests.ros.configs import config, inputs
+from tests.ros.configs import inputs
 from tests.ros.frames import Frame
 from tests.ros.manifests import read
 from tests.ros.streams import BEGIN, MS, at, merged
@@ -38,8 +39,10 @@ _RIG = rig(10)
 
 def _written(bag: Path, output: Path, **keys) -> list[Frame]:
     """What a replay with a group of a camera and a lidar writes, as rosbags reads it."""
-    group = {"policy": "approximate_time", "slop": "5ms", "manifest": False, "topics": inputs(_PAIR), **keys}
-    with bound(bag, text=config({"front": group})) as (recording, bindings), McapOutput(output) as written:
+    with (
+        bound(bag, text=rig_file(**{"manifest": False, **keys})) as (recording, bindings),
+        McapOutput(output) as written,
+    ):
         writer = SetWriter(written)
         for binding in bindings:
             writer.begin(binding)
