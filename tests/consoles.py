@@ -263,10 +263,3 @@ def _stays(words: Sequence[str]) -> bool:
 def is_live(block: Block) -> bool:
     """Whether a console block needs nodes, or a relay."""
     return any(_LIVE & {*command.split()} for command in commands_of(block))
-
-
-def files_of(folder: Path, content: Mapping[str, str]) -> None:
-    """Write files into a folder."""
-    for name, text in content.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_text(text)
