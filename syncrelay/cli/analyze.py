@@ -5,7 +5,7 @@ from argparse import Namespace
 from contextlib import closing
 from typing import TYPE_CHECKING
 
-from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, tell
+from syncrelay.cli.boundary import AT_FAULT, DONE, exit_code, put, remark, tell
 from syncrelay.cli.fleet_options import add_fleet_options, require_into
 from syncrelay.cli.new_file import write_again, write_new, write_suggested
 from syncrelay.cli.parser import Parser
@@ -132,7 +132,7 @@ def _analyze_in_turn(bags: "Sequence[str]", arguments: Namespace, text: str | No
             code = max(code, _analyze(bag, arguments, text, topics, indent=None))
         except SyncRelayError as error:
             tell(error)
-            code = AT_FAULT
+            code = max(code, exit_code(error))
     return code
 
 

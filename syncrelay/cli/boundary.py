@@ -57,7 +57,7 @@ def _guarded(command: Callable[[], int]) -> int:
         _to_stdout(sys.stdout.flush)
     except SyncRelayError as error:
         tell(error)
-        return _code(error)
+        return exit_code(error)
     except (KeyboardInterrupt, Terminated) as ended:
         return TERMINATED if isinstance(ended, Terminated) else INTERRUPTED
     except BrokenPipeError:
@@ -149,7 +149,8 @@ def tell(error: SyncRelayError) -> None:
         remark(str(error))
 
 
-def _code(error: SyncRelayError) -> int:
+def exit_code(error: SyncRelayError) -> int:
+    """Return the code that a command ends with at this error."""
     match error:
         case UsageError():
             return USAGE

@@ -1,5 +1,6 @@
 import json
 import shlex
+import sys
 
 import pytest
 
@@ -185,7 +186,7 @@ def test_keys_that_no_two_inputs_have_in_common_are_found(folder):
     assert group["findings"][0] == found
 
 
-def test_several_recordings_are_measured_one_after_another_and_a_faulty_one_ends_no_other(folder):
+def test_several_recordings_are_measured_one_after_another_and_a_faulty_one_ends_no_other(folder, monkeypatch):
     (folder / "empty.mcap").write_bytes(b"")
     write_mcap(folder / "short.mcap", rig(20))
     of = ("--config", "f.yaml", "--json")
@@ -193,6 +194,9 @@ def test_several_recordings_are_measured_one_after_another_and_a_faulty_one_ends
     done = run_here("analyze", "rig.mcap", "empty.mcap", "short.mcap", *of, folder=folder)
     assert (done.returncode, done.stderr) == (1, "syncrelay: empty.mcap: is empty\n")
     assert list(map(json.loads, done.stdout.splitlines())) == alone
+    monkeypatch.setitem(sys.modules, "adlfs", None)
+    unread = run_here("analyze", "abfs://bucket/rig.mcap", "empty.mcap", "short.mcap", *of, folder=folder)
+    assert (unread.returncode, json.loads(unread.stdout)) == (69, alone[1])
     (folder / "bad.yaml").write_text((folder / "f.yaml").read_text().replace("slop", "slopp"))
     faulty = run_here("analyze", "rig.mcap", "short.mcap", "--config", "bad.yaml", folder=folder)
     assert (faulty.returncode, faulty.stdout, faulty.stderr.count("unknown key")) == (1, "", 1)
