@@ -44,6 +44,26 @@ def test_status_is_json_and_metrics_are_prometheus_text():
     assert 'syncrelay_sets_total{group="front"} 30.0\n' in metrics[1]
 
 
+@pytest.mark.parametrize(
+    ("accept", "content_type", "end"),
+    [
+        ("*/*", "text/plain; version=0.0.4", ""),
+        ("application/openmetrics-text;version=1.0.0,text/plain;q=0.5", "application/openmetrics-text", "# EOF\n"),
+    ],
+)
+def test_metrics_come_in_the_form_that_a_scraper_accepts_and_uncompressed(accept, content_type, end):
+    asked_for = f"Host: localhost\r\nAccept: {accept}\r\nAccept-Encoding: gzip\r\nConnection: close"
+    ask = f" /metrics HTTP/1.1\r\n{asked_for}\r\n\r\n"
+    with serving(HEALTHY) as address:
+        head, _, body = sent(address, f"GET{ask}".encode()).decode().partition("\r\n\r\n")
+        without_body = sent(address, f"HEAD{ask}".encode()).decode()
+    assert f"\r\nContent-Type: {content_type}" in head
+    assert 'syncrelay_sets_total{group="front"} 30.0\n' in body
+    assert body.endswith(end)
+    assert without_body.endswith("\r\n\r\n")
+    assert f"\r\nContent-Length: {len(body)}\r\n" in without_body
+
+
 def test_the_root_is_a_page_of_files_that_are_all_there_and_of_nothing_else():
     with serving(HEALTHY) as address:
         code, page = asked(address, "/")

@@ -88,6 +88,13 @@ def test_the_strip_moves_on_between_two_reports():
     assert shown(one) != shown(later)
 
 
+def test_the_strip_holds_no_more_than_a_report_and_stops_at_the_newest_message():
+    one = moment()
+    late = [Moment(one.state, one.elapsed_s, one.total_s, one.now + seconds * 1_000_000_000) for seconds in (5, 9)]
+    first, second = (window_of(each, 250) for each in late)
+    assert (first, first.width, first.column_ns) == (second, 65, 20_000_000)
+
+
 def test_nothing_depends_on_colour():
     plain = shown(moment())
     coloured = shown(moment(), force_terminal=True, color_system="256")

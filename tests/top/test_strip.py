@@ -97,7 +97,7 @@ def test_messages_stand_on_their_lanes_by_their_stamps(recent, lanes):
 
 
 def test_a_set_keeps_its_letter_when_older_ones_are_forgotten():
-    assert drawn([a_set(45, 45), a_set(145, 145)], sets=28)[0] == "  A    B"
+    assert drawn([a_set(45, 45), a_set(145, 145)], sets=29)[0] == "  B    C"
 
 
 def test_three_inputs_have_three_lanes():
