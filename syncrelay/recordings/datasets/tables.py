@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
 import pyarrow as pa
+import pyarrow.compute as pc
 from rosbags.typesys.store import Typestore
 
 from syncrelay import own_version
@@ -146,7 +147,7 @@ class _InputColumn:
         self.type: Final = each.config.type or ""
         self._offset = each.config.offset_ns
         self._outgoing: dict[Channel, Outgoing] = {channel: outgoing(each, channel) for channel in each.channels}
-        self._decoder: Decoder | None = None
+        self._decoders: dict[Channel | None, Decoder] = {}
         self._undecodable = 0
         self._images: ImageColumn | None = None
         self.arrow: pa.DataType = pa.binary() if content.raw else pa.null()
@@ -161,18 +162,21 @@ class _InputColumn:
         image_format = content.images.get(each.topic, content.other_images)
         if image_format is not None and self.type == IMAGE and (paths is None or "data" in paths):
             self._images = ImageColumn(each.topic, image_format)
-        stores = [self._store(channel.type, channel.definition) for channel in each.channels]
+        stores: dict[Channel | None, Typestore] = {
+            channel: self._store(channel.type, channel.definition) for channel in each.channels
+        }
         if not stores and self.type and typestore(self.type, None) is not None:
             # The column of nulls has the type that the file names.
-            stores = [self._store(self.type, None)]
+            stores = {None: self._store(self.type, None)}
         if not stores:
             return
-        wholes = [arrow_type(store, self.type, topic=self.topic) for store in stores]
-        if any(whole != wholes[0] for whole in wholes):
-            raise BagError(f"{self.topic} was recorded with two definitions of {self.type}: use --raw")
-        needed = paths if paths is None or self._images is None else [*paths, *NEEDED]
-        self.arrow = arrow_type(stores[0], self.type, needed, topic=self.topic)
-        self._decoder = Decoder(wholes[0], self.arrow)
+        self._decoders = self._made_decoders(stores, paths)
+        self.arrow, *others = {decoder.arrow: None for decoder in self._decoders.values()}
+        if others:
+            raise BagError(
+                f"{self.topic} was recorded with two definitions of {self.type}: use --raw, or --fields with fields"
+                " that are the same in both"
+            )
         if self._images is not None:
             asked = frozenset(paths or [field.name for field in self.arrow])
             self.arrow = self._images.arrow(self.arrow, asked)
@@ -181,16 +185,16 @@ class _InputColumn:
     def undecodable(self) -> int:
         """How many messages of sets could not be decoded, and are null."""
         images = 0 if self._images is None else self._images.undecodable
-        return self._undecodable + images + (0 if self._decoder is None else self._decoder.undecodable)
+        return self._undecodable + images + sum(each.undecodable for each in set(self._decoders.values()))
 
     def column(self, messages: Sequence[tuple[Message | None, int | None]]) -> pa.ChunkedArray:
         """Return a column of messages, each given with the common stamp of its set."""
         if pa.types.is_null(self.arrow):
             return pa.chunked_array([pa.nulls(len(messages))])
         payloads = [None if message is None else self._payload(message, stamp) for message, stamp in messages]
-        if self._decoder is None:
+        if not self._decoders:
             return pa.chunked_array([pa.array(payloads, type=self.arrow)])
-        found = self._decoder.decode(payloads)
+        found = self._decoded([None if message is None else message.payload[0] for message, _ in messages], payloads)
         return found if self._images is None else self._images.encode(found, self.arrow)
 
     def described(self, column: pa.ChunkedArray) -> dict[str, Any]:
@@ -204,6 +208,36 @@ class _InputColumn:
             if self.type == _CLOUD and first.get("fields") is not None:
                 about["fields"] = json.dumps(first["fields"])
         return about
+
+    def _made_decoders(
+        self, stores: Mapping[Channel | None, Typestore], paths: Sequence[str] | None
+    ) -> dict[Channel | None, Decoder]:
+        """Return a decoder for each channel; equal definitions share one."""
+        needed = paths if paths is None or self._images is None else [*paths, *NEEDED]
+        made: dict[pa.StructType, Decoder] = {}
+        decoders: dict[Channel | None, Decoder] = {}
+        for channel, store in stores.items():
+            whole = arrow_type(store, self.type, topic=self.topic)
+            if whole not in made:
+                made[whole] = Decoder(whole, arrow_type(store, self.type, needed, topic=self.topic))
+            decoders[channel] = made[whole]
+        return decoders
+
+    def _decoded(self, channels: Sequence[Channel | None], payloads: Sequence[bytes | None]) -> pa.ChunkedArray:
+        decoders = [*set(self._decoders.values())]
+        if len(decoders) == 1:
+            return decoders[0].decode(payloads)
+        # Each decodes the messages of its own definition, and gives null for the others.
+        columns = [
+            decoder.decode(
+                [
+                    payload if self._decoders.get(channel) is decoder else None
+                    for channel, payload in zip(channels, payloads, strict=True)
+                ]
+            ).combine_chunks()
+            for decoder in decoders
+        ]
+        return pa.chunked_array([pc.coalesce(*columns)])
 
     def _payload(self, message: Message, stamp: int | None) -> bytes | None:
         channel, _, recorded = message.payload

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.writer import Writer
 from PIL import Image
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from syncrelay.config import load_text
 from syncrelay.errors import BagError, UsageError
@@ -335,3 +337,32 @@ def _undefined(path: Path, frames):
             writer.add_message(channels[frame.topic], frame.time, frame.payload, frame.time)
         writer.finish()
     return path
+
+
+def test_fields_that_two_definitions_of_a_type_share_are_read_from_both(tmp_path):
+    path = tmp_path / "bag.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros2")
+        channels = []
+        for added in ("", "string added\n"):
+            store = get_typestore(Stores.ROS2_JAZZY)
+            store.register(get_types_from_msg(f"std_msgs/Header header\n{added}int64 number\n", CUSTOM))
+            schema = writer.register_schema(CUSTOM, "ros2msg", store.generate_msgdef(CUSTOM, ros_version=2)[0].encode())
+            channels.append((store, [writer.register_channel(topic, "cdr", schema) for topic in ("/camera", "/lidar")]))
+        for n in range(10):
+            store, topics = channels[n // 3 % 2]
+            types = store.types
+            header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](n + 1, 0), "rig")
+            message = types[CUSTOM](header, *["text"] * (n // 3 % 2), n)
+            for topic in topics:
+                writer.add_message(topic, (n + 1) * 1000 * MS, bytes(store.serialize_cdr(message, CUSTOM)), 0)
+        writer.finish()
+    shared = ["header.frame_id", "number"]
+    rows = rows_of(path, config(), fields={"/camera": shared, "/lidar": shared})
+    assert [row["/camera"] for row in rows] == [{"header": {"frame_id": "rig"}, "number": n} for n in range(10)]
+    assert [row["/lidar"] for row in rows] == [row["/camera"] for row in rows]
+    with pytest.raises(BagError, match="two definitions of rig_msgs/msg/Blip: use --raw, or --fields with fields that"):
+        rows_of(path, config())
+    with pytest.raises(BagError, match="has no field `added`"):
+        rows_of(path, config(), fields={"/camera": ["added"]})
