@@ -44,8 +44,13 @@ class Kind(Protocol[_Parsed_co]):
 class _Content(BytesIO):
     """The content of a record; reading past its end, which mcap does not notice, raises EOFError."""
 
+    def __init__(self, content: bytes) -> None:
+        super().__init__(content)
+        # Not from getbuffer(), which would copy the content.
+        self._size = len(content)
+
     def read(self, size: int | None = -1, /) -> bytes:
-        if size is not None and size > len(self.getbuffer()) - self.tell():
+        if size is not None and size > self._size - self.tell():
             raise EOFError("a length in it points past its end")
         return super().read(size)
 
