@@ -5,7 +5,7 @@ from argparse import Namespace
 from contextlib import closing
 from typing import TYPE_CHECKING
 
-from syncrelay.cli.boundary import AT_FAULT, DONE, exit_code, put, remark, tell
+from syncrelay.cli.boundary import AT_FAULT, DONE, exit_code, flush, put, remark, tell, tell_machine_or_bug
 from syncrelay.cli.fleet_options import add_fleet_options, require_into
 from syncrelay.cli.new_file import write_again, write_new, write_suggested
 from syncrelay.cli.parser import Parser
@@ -125,7 +125,9 @@ def _analyze_many(
 
 
 def _analyze_in_turn(bags: "Sequence[str]", arguments: Namespace, text: str | None, topics: tuple[str, ...]) -> int:
-    """Analyze recordings one after another; one that cannot be read does not end the others."""
+    """Analyze recordings one after another; neither one that cannot be read nor a bug ends the others."""
+    from syncrelay.urls import redacted
+
     code = DONE
     for bag in bags:
         try:
@@ -133,6 +135,13 @@ def _analyze_in_turn(bags: "Sequence[str]", arguments: Namespace, text: str | No
         except SyncRelayError as error:
             tell(error)
             code = max(code, exit_code(error))
+        except BrokenPipeError:
+            raise
+        except Exception as error:  # noqa: BLE001  a bug with one recording must not stop the others
+            code = max(code, tell_machine_or_bug(error))
+            remark(f"it happened with the recording {redacted(bag)}")
+        # Each is there when it is done, and before what is said of the next.
+        flush()
     return code
 
 

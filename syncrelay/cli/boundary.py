@@ -65,12 +65,15 @@ def _guarded(command: Callable[[], int]) -> int:
         _abandon(sys.stdout)
         return AT_FAULT
     except Exception as error:  # noqa: BLE001  the boundary: everything else is our bug
-        return _of_machine_or_bug(error)
+        return tell_machine_or_bug(error)
     return code
 
 
-def _of_machine_or_bug(error: Exception) -> int:
-    """Report a missing package or a full disk; anything else is our bug, and is shown with its traceback."""
+def tell_machine_or_bug(error: Exception) -> int:
+    """Report a missing package or a full disk; anything else is our bug, and is shown with its traceback.
+
+    Returns the exit code.
+    """
     if isinstance(error, ImportError) and error.name and error.name.partition(".")[0] != "syncrelay":
         remark(_lacking(error, error.name.partition(".")[0]))
         return UNAVAILABLE

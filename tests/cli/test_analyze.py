@@ -4,6 +4,7 @@ import sys
 
 import pytest
 
+from syncrelay.cli.analyze import _analyze
 from syncrelay.cli.demo import shipped_config
 from tests.cli.command import run, run_here
 from tests.recordings.bag.making import rig, write_mcap
@@ -200,3 +201,18 @@ def test_several_recordings_are_measured_one_after_another_and_a_faulty_one_ends
     (folder / "bad.yaml").write_text((folder / "f.yaml").read_text().replace("slop", "slopp"))
     faulty = run_here("analyze", "rig.mcap", "short.mcap", "--config", "bad.yaml", folder=folder)
     assert (faulty.returncode, faulty.stdout, faulty.stderr.count("unknown key")) == (1, "", 1)
+
+
+def test_a_bug_on_one_of_several_recordings_ends_no_other(folder, monkeypatch):
+    write_mcap(folder / "short.mcap", rig(20))
+    of = ("--config", "f.yaml")
+    alone = run_here("analyze", "short.mcap", *of, folder=folder).stdout
+
+    def measured(bag, *words, **options):
+        return _analyze(bag, *words, **options) if bag == "short.mcap" else 1 // 0
+
+    monkeypatch.setattr("syncrelay.cli.analyze._analyze", measured)
+    done = run_here("analyze", "rig.mcap", "short.mcap", *of, folder=folder)
+    assert (done.returncode, done.stdout) == (70, alone)
+    assert "ZeroDivisionError" in done.stderr
+    assert done.stderr.endswith("syncrelay: it happened with the recording rig.mcap\n")
