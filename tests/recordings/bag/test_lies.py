@@ -3,6 +3,7 @@
 import os
 import sqlite3
 import struct
+import tracemalloc
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -190,6 +191,25 @@ def test_an_mcap_file_whose_index_lies_is_gone_through(lie, tmp_path):
     at = content.rindex(struct.pack("<Q", begin))
     path.write_bytes(content[:at] + struct.pack("<Q", lie) + content[at + 8 :])
     assert read(path) == (_RIG, [], [])
+
+
+def test_no_summary_is_read_that_is_larger_than_any(tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", _RIG, enable_crcs=False)
+    content = path.read_bytes()
+    # The footer and the magic bytes, behind a record that is a hole of 300 MB.
+    end = len(content) - struct.calcsize("<BQQQI") - 8
+    with path.open("r+b") as file:
+        file.seek(end)
+        file.write(struct.pack("<BQ", 0x80, 300_000_000))
+        file.seek(300_000_000, os.SEEK_CUR)
+        file.write(content[end:])
+    tracemalloc.start()
+    try:
+        assert read(path) == (_RIG, [], [])
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert most < 10_000_000
 
 
 def test_messages_that_come_behind_later_ones_are_read_and_said(tmp_path):
