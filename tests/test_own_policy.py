@@ -36,7 +36,6 @@ from tests.ros.streams import MS, at, merged
 
 _TOPICS = ("/left", "/right")
 _TYPES = dict.fromkeys(_TOPICS, VECTOR)
-_OF_POLICIES = {"slop": "20ms", "trigger": _TOPICS[0], "key": "header.frame_id"}
 
 
 @pytest.fixture(scope="module")
@@ -306,7 +305,14 @@ def test_policies_may_share_a_key_of_one_type_and_none_of_two(folders: Iterator[
 
 @pytest.mark.parametrize("model", GROUP_MODELS, ids=lambda model: model.__name__)
 def test_what_the_options_say_of_a_policy_is_what_its_engine_does(model: type[Group]):
-    needed = {key: value for key, value in _OF_POLICIES.items() if key in model.model_fields}
+    examples = {
+        key: str(field.examples[0])
+        for key, field in model.model_fields.items()
+        if field.is_required() and field.examples and key != "policy"
+    }
+    needed = {key: _TOPICS[0] if example.startswith("/") else example for key, example in examples.items()}
+    if "key" in model.model_fields:
+        needed["key"] = "header.frame_id"
     (policy,) = get_args(model.model_fields["policy"].annotation)
     (group,) = load_text(config({"fused": {"policy": policy, "topics": inputs(_TYPES), **needed}})).groups
     engine = group.options.build_policy(group.inputs)

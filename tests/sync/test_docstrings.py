@@ -16,6 +16,7 @@ from syncrelay.sync import (
     SyncGroup,
     Ticks,
 )
+from tests.sync.support.rigs import EXPORTED
 from tests.sync.support.timeline import TICK_NS, play_group
 
 
@@ -34,6 +35,10 @@ POLICIES = [
     LatestAtTicks(**SIZES, ticks=Ticks(20)),
     EqualKey(**SIZES),
 ]
+
+
+def test_each_policy_is_here():
+    assert set(map(type, POLICIES)) == EXPORTED
 
 
 def drawing_in(docstring):

@@ -14,6 +14,7 @@ from syncrelay.sync import (
     LatestTime,
     Ticks,
 )
+from tests.sync.support.rigs import EXPORTED
 
 SIZES: list[dict[str, Any]] = [{"n_inputs": 0}, {"queue_size": 0}]
 OF_LATEST: list[dict[str, Any]] = [{"required": (True,)}, {"max_ages_ns": (None, -1)}, {"max_ages_ns": (None,)}]
@@ -38,6 +39,10 @@ WRONG: dict[Any, list[dict[str, Any]]] = {
     LatestAtTicks: [{"required": (False, False)}, *OF_LATEST],
 }
 CASES = [(policy, wrong) for policy in RIGHT for wrong in (*SIZES, *WRONG.get(policy, ()))]
+
+
+def test_each_policy_is_here():
+    assert set(RIGHT) == EXPORTED
 
 
 @pytest.mark.parametrize(("policy", "wrong"), CASES, ids=lambda value: getattr(value, "__name__", str(value)))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from hypothesis import strategies as st
 
+from syncrelay import sync
 from syncrelay.config.installed import policy_name, topic_model
 from syncrelay.config.models import Inputs
 from syncrelay.config.policies import GROUP_MODELS
@@ -56,6 +57,12 @@ BY_CLOCK = {
         max_ages_ns=options.max_ages_ns,
     )
 }
+EXPORTED = {
+    each
+    for each in vars(sync).values()
+    if isinstance(each, type) and hasattr(each, "by_stamp") and each is not sync.Policy
+}
+"""The engines of all policies that the library has."""
 BY_STAMP = [name for name, model in POLICIES.items() if model.by_stamp]
 ONCE = [name for name, model in POLICIES.items() if not model.repeats]
 
