@@ -24,7 +24,8 @@ class _NoProcesses:
 
     def _hear(self, event: str, arguments: tuple) -> None:
         if self._runs and (event in _STARTS or (event == "import" and arguments[0] == "rclpy")):
-            pytest.fail(f"{event} {arguments[0]}: no test of `make test-fast`; give it a marker that leaves it out")
+            what = " ".join(map(str, (event, *arguments[:1])))
+            pytest.fail(f"{what}: no test of `make test-fast`; give it a marker that leaves it out")
 
 
 def pytest_configure(config: pytest.Config) -> None:

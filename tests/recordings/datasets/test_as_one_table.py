@@ -54,6 +54,7 @@ def test_all_rows_are_read_with_the_times_that_were_drawn(case, tmp_path):
             assert count(tmp_path / "out") == len(drawn), (seed, reader)
 
 
+@pytest.mark.process
 def test_the_page_reads_the_folder_as_it_says(tmp_path):
     page = (Path(__file__).parents[3] / "docs/howto/datasets.md").read_text()
     (snippet,) = [block.text for block in blocks_of(page) if "ds.dataset(" in block.text]

@@ -10,6 +10,8 @@ from tests.cli.terminals import on_terminal
 from tests.recordings.bag.making import rig, write_mcap
 from tests.recordings.fleet.fleets import FILE, TOPICS, entries, file_text, make_fleet, replay_into, result, tree
 
+pytestmark = pytest.mark.process
+
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):

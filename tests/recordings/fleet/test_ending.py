@@ -18,6 +18,8 @@ from tests.recordings.fleet.fleets import FILE, LEDGER, entries, make_fleet, rep
 from tests.recordings.fleet.tasks import OBEDIENT, attempts_of
 from tests.ros.processes import children_of, wait_until
 
+pytestmark = pytest.mark.process
+
 _DEADLINE_S = 60
 _KILLS = 50 if IS_LONG else 6
 ENVIRON = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONSAFEPATH": "1"}

@@ -26,6 +26,8 @@ from tests.recordings.bag.making import write_mcap
 from tests.recordings.fleet.fleets import FILE, file_text, result
 from tests.ros.streams import at, merged
 
+pytestmark = pytest.mark.process
+
 _SEED = 29
 _DRAWN = 30
 _LASTS_S = 8

@@ -112,6 +112,7 @@ _OPENS = (
 )
 
 
+@pytest.mark.process
 def test_a_second_process_is_refused_while_the_first_is_at_work(out):
     with Ledger(out):
         assert "another command is at work in it" in run_python("-c", _OPENS, str(out), folder=out).stderr
@@ -129,6 +130,7 @@ os._exit(0)
 """
 
 
+@pytest.mark.process
 def test_a_worker_that_outlives_the_command_does_not_hold_the_lock(out):
     environ = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONSAFEPATH": "1"}
     with subprocess.Popen([sys.executable, "-c", _FORKS, str(out)], stdout=subprocess.PIPE, env=environ) as command:

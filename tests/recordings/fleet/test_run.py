@@ -18,6 +18,8 @@ from tests.faults.extent import chosen
 from tests.recordings.fleet.fleets import entries, result, tree
 from tests.recordings.fleet.tasks import Obedient, attempts_of
 
+pytestmark = pytest.mark.process
+
 
 @pytest.fixture
 def bags(tmp_path):
