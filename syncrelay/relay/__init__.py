@@ -1,0 +1,1 @@
+"""What the relay does, over the ports of `ports.py`; nothing here knows rclpy."""
