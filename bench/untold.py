@@ -10,7 +10,7 @@ from syncrelay.dataflow import flow
 flow.RECENT = 0  # type: ignore[misc]  # this file takes away what is there
 
 from syncrelay.cli import main  # noqa: E402
-from syncrelay.ros.monitor import Monitor  # noqa: E402
+from syncrelay.relay.monitor import Monitor  # noqa: E402
 
 _NOTHING = deque[Any](maxlen=0)
 

@@ -49,6 +49,10 @@ class Runtime(Protocol):
         """Nanoseconds of the system clock, as time.time_ns()."""
         ...
 
+    def thread_time_ns(self) -> int:
+        """Nanoseconds for which the calling thread has used a processor, as time.thread_time_ns()."""
+        ...
+
     def sleep(self, seconds: float) -> None:
         """Let other threads run for so long."""
         ...
@@ -78,6 +82,7 @@ class SystemRuntime:
         self.monotonic = time.monotonic
         self.monotonic_ns = time.monotonic_ns
         self.time_ns = time.time_ns
+        self.thread_time_ns = time.thread_time_ns
         self.sleep = time.sleep
         self.lock = threading.Lock
         self.rest = Wakeup

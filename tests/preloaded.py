@@ -65,7 +65,8 @@ _OF_NODES: Final = (
     "syncrelay.config",
     "syncrelay.logs",
     "syncrelay.ros.compiled.backend",
-    "syncrelay.ros.relay",
+    "syncrelay.relay.running",
+    "syncrelay.ros.joining",
     "syncrelay.ros.rclpy_backend",
     "syncrelay.status.server",
 )

@@ -18,8 +18,8 @@ from syncrelay.cli.top import can_draw
 from syncrelay.printable import printable
 
 if TYPE_CHECKING:
+    from syncrelay.relay.relay import Relay
     from syncrelay.rig.processes import Rig
-    from syncrelay.ros.relay import Relay
     from syncrelay.status.document import Status
     from syncrelay.top.plain import Moment
 
@@ -106,14 +106,15 @@ def relay_rig(
     stop.defer()
     with quick_discovery(), Rig(seed=seed) as rig, view as show:
         # Imported while the sensors start.
-        from syncrelay.ros.relay import Relay
+        from syncrelay.relay.relay import Relay
+        from syncrelay.ros.joining import joined
 
         config = load_text(shipped_config())
         while not stop.requested and not rig.is_up():
             time.sleep(_FRAME_S)
         if stop.requested:
             return None
-        with Relay(config) as relay:
+        with Relay(config, *joined(config)) as relay:
             return _relay(relay, rig, show, total_s=total_s, stop=stop)
 
 
@@ -203,9 +204,9 @@ def record(name: str, seconds: float, seed: int) -> int:
     from itertools import takewhile
 
     from syncrelay.cdr import patch_stamp
+    from syncrelay.config.profile import Profile
     from syncrelay.recordings.bag.definitions import jazzy_definition
     from syncrelay.recordings.bag.mcap_output import McapOutput
-    from syncrelay.recordings.bag.qos import Profile
     from syncrelay.rig.scene import SCENES
     from syncrelay.rig.schedule import SENSORS, schedule
 

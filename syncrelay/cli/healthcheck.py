@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final, Self
 
 if TYPE_CHECKING:
     from argparse import Namespace
+    from collections.abc import Callable
 
     from syncrelay.cli.parser import Parser
     from syncrelay.cli.stop import StopRequest
@@ -28,8 +29,9 @@ _STALE_NS: Final = 5_000_000_000
 class Heartbeat:
     """Writes the time into a file, at most twice a second; a context manager that removes the file when it ends."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, now: "Callable[[], int]" = time.monotonic_ns) -> None:
         """Create the file, empty until the first beat; raises OSError if it cannot be created."""
+        self._now = now
         self._path = path
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW | os.O_CLOEXEC, 0o644)
         self._due = 0
@@ -45,7 +47,7 @@ class Heartbeat:
 
     def beat(self) -> None:
         """Note that the loop has turned."""
-        now = time.monotonic_ns()
+        now = self._now()
         if now >= self._due:
             self._due = now + _PERIOD_NS
             # A single write of fixed length: a reader sees the old time or the new one, never a mix.

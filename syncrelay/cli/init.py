@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from syncrelay.recordings.analysis import Proposal
     from syncrelay.recordings.analysis.streams import Stream
     from syncrelay.recordings.bag import Channel
-    from syncrelay.ros.listening import Heard
+    from syncrelay.relay.listening import Heard
 
 
 def parser() -> Parser:
@@ -72,7 +72,7 @@ def _from_graph(seconds: float) -> "Proposal":
     from syncrelay.ros.environment import require_rclpy
 
     require_rclpy()
-    from syncrelay.ros.listening import listen
+    from syncrelay.ros.joining import listen
 
     if sys.stderr.isatty():
         say(f"listening to the graph for {seconds:g} s ...")
@@ -92,10 +92,10 @@ def _from_graph(seconds: float) -> "Proposal":
 
 
 def _streams(heard: "Heard") -> "Iterator[tuple[Channel, Stream]]":
+    from syncrelay.config.profile import Profile
     from syncrelay.explain import UNREADABLE
     from syncrelay.recordings.analysis.streams import Stream
     from syncrelay.recordings.bag import Channel, Encoding
-    from syncrelay.recordings.bag.qos import Profile
 
     for number, topic in enumerate(heard.topics):
         profile = Profile(reliability="reliable" if topic.is_reliable else "best_effort")

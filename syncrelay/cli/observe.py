@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from syncrelay.config import Config
     from syncrelay.recordings.analysis import GroupAnalysis
-    from syncrelay.ros.relay import Relay
+    from syncrelay.relay.relay import Relay
     from syncrelay.status import RelayState
     from syncrelay.top.client import Answer
 
@@ -85,17 +85,18 @@ def _observe(
     with resting_collector():
         from syncrelay.cli.top import why_no_screen
         from syncrelay.recordings.analysis.live import LiveStreams, analyze_live
-        from syncrelay.ros.entities import Purpose
-        from syncrelay.ros.relay import Relay
+        from syncrelay.relay.ports import Purpose
+        from syncrelay.relay.relay import Relay
+        from syncrelay.ros.joining import joined
 
     groups = [group for group in config.groups if not arguments.group or group.name in arguments.group]
     live = LiveStreams(groups)
     stop.defer()
     with Relay(
         config,
+        *joined(config, ros_args=arguments.ros_args, purpose=Purpose.OBSERVE),
         config_paths=arguments.config,
         groups=arguments.group or None,
-        ros_args=arguments.ros_args,
         purpose=Purpose.OBSERVE,
     ) as relay:
         relay.monitor.heard = live.take

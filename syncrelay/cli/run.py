@@ -1,14 +1,11 @@
 """`syncrelay --config FILE`: run the relay until SIGINT or SIGTERM."""
 
 import os
-import traceback
 from argparse import Namespace
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future
 from contextlib import AbstractContextManager, nullcontext
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING
 
 from syncrelay import own_version
 from syncrelay.cli.boundary import DONE, EXIT_CODES, put
@@ -16,20 +13,13 @@ from syncrelay.cli.healthcheck import VARIABLE, Heartbeat
 from syncrelay.cli.parser import Parser, folded
 from syncrelay.cli.stop import StopRequest
 from syncrelay.collector import resting_collector
-from syncrelay.errors import ListenError, ReloadError, SyncRelayError, UsageError
+from syncrelay.errors import ListenError, UsageError
 
 if TYPE_CHECKING:
     from syncrelay.config import Config, Listen
-    from syncrelay.config.rereading import ConfigFiles, Reading
-    from syncrelay.ros.relay import Relay
+    from syncrelay.relay.ports import Outcome
+    from syncrelay.relay.relay import Relay
     from syncrelay.status.server import Server
-
-_FAILED: Final = "reload failed; keeping the running configuration:"
-_FAILED_WITHOUT_GROUPS: Final = "reload failed; no groups are running:"
-_BUG: Final = (
-    "reload failed because of a bug in syncrelay; keeping the running configuration;"
-    " please report it with these lines and the file:"
-)
 
 
 def parser() -> Parser:
@@ -85,18 +75,17 @@ def command(parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
     require_rclpy()
     with resting_collector():
         from syncrelay.explain.summary import log_summary
-        from syncrelay.ros.relay import Relay
+        from syncrelay.relay.relay import Relay
+        from syncrelay.relay.running import run, services
+        from syncrelay.ros.joining import joined
 
-    def managed(relay: Relay) -> Callable[..., Any]:
-        from syncrelay.ros.lifecycle import ManagedNode, Transitions
+    def require(config: "Config") -> None:
+        require_groups(groups, config, config_paths)
 
-        def require(config: "Config") -> None:
-            require_groups(groups, config, config_paths)
+    def managed(relay: Relay) -> "Callable[[str], Outcome]":
+        from syncrelay.relay.transitions import Transitions
 
-        return partial(
-            ManagedNode,
-            transitions=Transitions(relay, paths=config_paths, require=require, is_stopped=lambda: stop.requested),
-        )
+        return Transitions(relay, paths=config_paths, require=require, is_stopped=lambda: stop.requested).carry_out
 
     stop.defer()
     with (
@@ -104,9 +93,9 @@ def command(parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
         listening(config.listen) as server,
         Relay(
             config,
+            *joined(config, ros_args=arguments.ros_args, is_managed=config.node.lifecycle),
             config_paths=config_paths,
             groups=groups or None,
-            ros_args=arguments.ros_args,
             on_turn=heartbeat.beat if heartbeat else None,
             manage=managed if config.node.lifecycle else None,
         ) as relay,
@@ -122,15 +111,8 @@ def command(parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
                 server.place.url,
             )
         if config.node.services:
-            relay.offer(
-                {
-                    "reload": files.read_again,
-                    "status": lambda: _status(relay),
-                    "pause": lambda: relay.call(relay.pause),
-                    "resume": lambda: relay.call(relay.resume),
-                }
-            )
-        _relay_until(stop, relay, files, lambda read: _reload(relay, read, config_paths, groups))
+            relay.offer(services(relay, files, lambda: _status(relay)))
+        run(relay, files, stop, require=require)
         log_summary(relay.drain())
     return DONE
 
@@ -152,47 +134,12 @@ def loaded(config_paths: Sequence[str], groups: Sequence[str]) -> "Config":
     return config
 
 
-def _status(relay: "Relay") -> Future[str]:
+def _status(relay: "Relay") -> str:
     # Imported when it is first asked for, which may be never.
     from syncrelay.status import status_of
     from syncrelay.top.plain import summary
 
-    told: Future[str] = Future()
-    told.set_result(summary(status_of(relay.state())))
-    return told
-
-
-def _relay_until(stop: StopRequest, relay: "Relay", files: "ConfigFiles", reload: "Callable[[Reading], None]") -> None:
-    while not stop.requested:
-        relay.step()
-        if stop.take_reload():
-            files.read_again()
-        if (read := files.take()) is not None:
-            reload(read)
-
-
-def _reload(relay: "Relay", read: "Reading", config_paths: Sequence[str], groups: Sequence[str]) -> None:
-    """Apply the files that were read again; if anything is wrong with them, the relay keeps its configuration."""
-    from syncrelay.logs import LOGGER
-
-    try:
-        config = read.config.result()
-        require_groups(groups, config, config_paths)
-        changed = relay.reload(config)
-    except SyncRelayError as error:
-        refusal = f"{_FAILED if relay.groups else _FAILED_WITHOUT_GROUPS}\n{error}"
-        LOGGER.error("%s", refusal)
-        relay.refuse_reload(error.outline)
-    except Exception as error:  # noqa: BLE001  a bug that a file triggers must not end the running relay
-        refusal = f"{_BUG}\n{''.join(traceback.format_exception(error)).rstrip()}"
-        LOGGER.exception("%s", _BUG)
-        relay.refuse_reload(f"reload failed because of a bug in syncrelay, {type(error).__name__}; see the relay's log")
-    else:
-        for each in read.asked:
-            each.set_result(changed)
-        return
-    for each in read.asked:
-        each.set_exception(ReloadError(refusal))
+    return summary(status_of(relay.state()))
 
 
 def _heartbeat(named: str | None) -> AbstractContextManager[Heartbeat | None]:

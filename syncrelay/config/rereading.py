@@ -1,7 +1,5 @@
 """The relay's files, read again on a thread of its own, so that a pipe or a file system that hangs delays nothing."""
 
-import threading
-import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from pathlib import Path
@@ -10,6 +8,7 @@ from typing import Final, NamedTuple, Self
 
 from syncrelay.config.load import Config, load
 from syncrelay.config.problems import ConfigError, Problem
+from syncrelay.runtime import SYSTEM, Runtime
 from syncrelay.yaml_files import yaml_files
 
 # `syncrelay reload` waits for 10 s.
@@ -39,28 +38,30 @@ class ConfigFiles:
     A context manager. Leaving it does not wait for a read that hangs: the thread ends with the process.
     """
 
-    def __init__(self, paths: Sequence[str], *, watched: bool) -> None:
+    def __init__(self, paths: Sequence[str], *, watched: bool, runtime: Runtime = SYSTEM) -> None:
         """Note the state of the files: changes are seen from here on."""
+        self._runtime = runtime
         self._paths = tuple(paths)
         self._known = self._marks() if watched else None
         self._seen = self._known
         self._seen_since = 0.0
-        self._lock = threading.Lock()
-        self._wanted = threading.Event()
+        self._lock = runtime.lock()
+        self._rest = runtime.rest()
+        self._is_wanted = False
         self._ended = False
         self._waiting: list[_Request] = []
         self._read: Reading | None = None
         self._done: Callable[[], None] = lambda: None
 
     def __enter__(self) -> Self:
-        threading.Thread(target=self._run, name="syncrelay-files", daemon=True).start()
+        self._runtime.start("syncrelay-files", self._run, daemon=True)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._ended = True
-        self._wanted.set()
+        self._rest.set()
 
     def call_when_read(self, done: Callable[[], None]) -> None:
         """Call `done`, on the thread that reads, when there is something to take."""
@@ -71,10 +72,11 @@ class ConfigFiles:
 
         Whoever takes the reading sets the future's result: what the reading led to, in words.
         """
-        request = _Request(time.monotonic(), Future())
+        request = _Request(self._runtime.monotonic(), self._runtime.future())
         with self._lock:
             self._waiting.append(request)
-        self._wanted.set()
+            self._is_wanted = True
+        self._rest.set()
         return request.told
 
     def take(self) -> Reading | None:
@@ -86,25 +88,25 @@ class ConfigFiles:
             read, self._read = self._read, None
             if read is not None:
                 return read
-            latest = time.monotonic() - _PATIENCE_S
+            latest = self._runtime.monotonic() - _PATIENCE_S
             late = tuple(request.told for request in self._waiting if request.since < latest)
             self._waiting = [request for request in self._waiting if request.since >= latest]
-        return Reading(_failed(self._paths), late) if late else None
+        return Reading(self._failed(), late) if late else None
 
     def _run(self) -> None:
         while not self._ended:
-            self._wanted.wait(None if self._known is None else _LOOK_S)
-            if self.have_changed(now=time.monotonic()):
+            self._rest.wait(None if self._known is None else _LOOK_S)
+            if self.have_changed(now=self._runtime.monotonic()):
                 self.read_again()
-            if self._wanted.is_set() and not self._ended:
-                self._wanted.clear()
+            if self._is_wanted and not self._ended:
                 self._read_now()
 
     def _read_now(self) -> None:
         with self._lock:
             # Requests during the read are for a later one, as the files may have changed.
+            self._is_wanted = False
             asked = list(self._waiting)
-        read: Future[Config] = Future()
+        read: Future[Config] = self._runtime.future()
         try:
             read.set_result(load(*self._paths, patience_s=_PIPE_S))
         except BaseException as error:  # noqa: BLE001  it is raised where the result is asked for
@@ -116,6 +118,12 @@ class ConfigFiles:
                 earlier = self._read.asked if self._read is not None else ()
                 self._read = Reading(read, (*earlier, *told))
         self._done()
+
+    def _failed(self) -> Future[Config]:
+        failed: Future[Config] = self._runtime.future()
+        text = f"could not be read within {_PATIENCE_S:g} s"
+        failed.set_exception(ConfigError([Problem(", ".join(self._paths), "", text, "unreadable")]))
+        return failed
 
     def have_changed(self, *, now: float) -> bool:
         """Whether watched files have changed since this last returned True, and then rested for some seconds."""
@@ -140,10 +148,3 @@ def _mark(path: Path) -> tuple[int, int, int] | None:
     except OSError:
         return None
     return status.st_ino, status.st_mtime_ns, status.st_size
-
-
-def _failed(paths: Sequence[str]) -> Future[Config]:
-    failed: Future[Config] = Future()
-    text = f"could not be read within {_PATIENCE_S:g} s"
-    failed.set_exception(ConfigError([Problem(", ".join(paths), "", text, "unreadable")]))
-    return failed

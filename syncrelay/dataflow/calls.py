@@ -2,9 +2,13 @@
 
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future
 from contextlib import suppress
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from syncrelay.runtime import SYSTEM, Runtime
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
 
 _Result = TypeVar("_Result")
 
@@ -15,8 +19,9 @@ class Calls:
     `wake` is called on the asking thread when there is something to carry out.
     """
 
-    def __init__(self, wake: Callable[[], None]) -> None:
+    def __init__(self, wake: Callable[[], None], *, runtime: Runtime = SYSTEM) -> None:
         self._wake = wake
+        self._future = runtime.future
         self._due: deque[tuple[Future[Any], Callable[[], None]]] = deque()
         self._ended = False
 
@@ -28,7 +33,7 @@ class Calls:
 
         A call is cancelled if the end comes before it is carried out, or has come already.
         """
-        future: Future[_Result] = Future()
+        future: Future[_Result] = self._future()
 
         def perform() -> None:
             try:

@@ -1,7 +1,6 @@
 """The way of a message through its group: its stamp is read, the engine matches it, its set leaves on the outlets."""
 
 import logging
-import time
 from collections import deque
 from collections.abc import Callable, Hashable, Sequence
 from typing import Final, NamedTuple, Self, TypeAlias
@@ -12,6 +11,7 @@ from syncrelay.config.wording import counted
 from syncrelay.dataflow.backend import Deliver, Outlet, Payload, PublishError
 from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
 from syncrelay.explain import Code, RecentDrop, Stamps, Tape
+from syncrelay.runtime import SYSTEM, Runtime
 from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
 
 _LOG = logging.getLogger("syncrelay")
@@ -84,7 +84,15 @@ class Flow:
     garbage.
     """
 
-    def __init__(self, config: GroupConfig, *, now: Callable[[], int], refusals: Refusals, tape: Tape) -> None:
+    def __init__(
+        self,
+        config: GroupConfig,
+        *,
+        now: Callable[[], int],
+        refusals: Refusals,
+        tape: Tape,
+        runtime: Runtime = SYSTEM,
+    ) -> None:
         n_inputs = len(config.topics)
         self.engine: Engine = config.engine()
         self.outlets: list[Outlet | None] = [None] * n_inputs
@@ -102,6 +110,7 @@ class Flow:
         """Hears of each set that left, and of its latency in nanoseconds."""
         self._config = config
         self._now = now
+        self._time_ns = runtime.time_ns
         self._refusals = refusals
         self._tape = tape
         self._watched = Watched.none_of(n_inputs)
@@ -141,7 +150,7 @@ class Flow:
         for outcome in outcomes:
             if isinstance(outcome, Match):
                 newest = self._send(outcome)
-                stamps, left = outcome.stamps, time.time_ns()
+                stamps, left = outcome.stamps, self._time_ns()
                 latency = left - newest
                 self._watched.sets.append((stamps, latency))
                 self.last.append(stamps)
@@ -155,7 +164,7 @@ class Flow:
                 drop = RecentDrop(message.input, message.stamp, outcome.reason)
                 self.last.append(drop)
                 if is_tapped:
-                    self._tape.note(self._config, drop, time.time_ns(), message.payload.received)
+                    self._tape.note(self._config, drop, self._time_ns(), message.payload.received)
 
     def _send(self, match: Match) -> int:
         """Publish a set, and return when its newest message was received."""

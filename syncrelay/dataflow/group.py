@@ -1,7 +1,6 @@
 """One group at work: payloads in, matched sets out on the group's publishers. Lives on the receive thread."""
 
 import logging
-import time
 from collections import deque
 from collections.abc import Callable, Hashable, Mapping
 from contextlib import suppress
@@ -14,6 +13,7 @@ from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
 from syncrelay.dataflow.flow import Engine, Flow, Refusals, Unpublished
 from syncrelay.dataflow.manifest_queue import GroupManifests
 from syncrelay.explain import Code, RecentDrop, Stamps, Tape
+from syncrelay.runtime import SYSTEM, Runtime
 from syncrelay.sync import DropReason, SyncGroup
 from syncrelay.sync.counts import InputCounts
 
@@ -48,11 +48,18 @@ class GroupRelay:
     """
 
     def __init__(
-        self, config: GroupConfig, *, now: Callable[[], int], flow: type[Flow] = Flow, tape: Tape | None = None
+        self,
+        config: GroupConfig,
+        *,
+        now: Callable[[], int],
+        flow: Callable[..., Flow] = Flow,
+        tape: Tape | None = None,
+        runtime: Runtime = SYSTEM,
     ) -> None:
+        """Have `flow` make its flow, from what Flow takes but the runtime, which each backend has for itself."""
         self.config = config
         self._n_inputs = len(config.topics)
-        self.flow = flow(config, now=now, refusals=Refusals(config.name), tape=tape or Tape())
+        self.flow = flow(config, now=now, refusals=Refusals(config.name), tape=tape or Tape(runtime=runtime))
         self.failure: str | None = None
         """What stopped it; None while it works."""
         self.paused_since: int | None = None
@@ -62,6 +69,7 @@ class GroupRelay:
         self.woke: int | None = None
         """When it was last fed again after a sleep, by the system clock in nanoseconds."""
         self._now = now
+        self._runtime = runtime
         self._suspended = self.engine
         self._held_by = StoppedEngine(0, ())
         self._was_connected: list[bool] = []
@@ -97,7 +105,7 @@ class GroupRelay:
         """Let nothing leave until `unpause`; what is buffered, and what comes meanwhile, is dropped as `paused`."""
         if self.paused_since is not None:
             return
-        self.paused_since = time.time_ns()
+        self.paused_since = self._runtime.time_ns()
         self._guarded(lambda: self.flow.conclude(self.engine.let_go(DropReason.PAUSED)))
         if isinstance(self.engine, SyncGroup):
             self.engine = PausedEngine(self.engine, held=self.config.held)
@@ -149,7 +157,7 @@ class GroupRelay:
 
     def wake(self) -> None:
         """Be fed again."""
-        self.sleeps, self.woke = False, time.time_ns()
+        self.sleeps, self.woke = False, self._runtime.time_ns()
 
     def watched(self) -> Batch:
         """Give what came and left since this was last asked for, and all counts."""

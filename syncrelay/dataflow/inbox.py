@@ -4,13 +4,13 @@ DDS keeps order within a topic only. Drained one topic after the other, a backlo
 queues before a slow topic's messages of the same time are seen.
 """
 
-import time
 from collections.abc import Iterable, Sequence
 from heapq import heappop, heappush
 from itertools import count
 from typing import TYPE_CHECKING, Final, TypeAlias
 
 from syncrelay.dataflow.backend import ALL, Payload, Source, Watch
+from syncrelay.runtime import SYSTEM, Runtime
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -106,9 +106,12 @@ class PolledInbox:
     When a message comes, it waits `coalesce_ns` for others before it takes them all.
     """
 
-    def __init__(self, watch: Watch, *, coalesce_ns: int = 0) -> None:
+    def __init__(self, watch: Watch, *, coalesce_ns: int = 0, runtime: Runtime = SYSTEM) -> None:
         self._watch = watch
         self._coalesce_s = coalesce_ns / _NS_PER_SECOND
+        self._monotonic_ns = runtime.monotonic_ns
+        self._time_ns = runtime.time_ns
+        self._sleep = runtime.sleep
         # In the order in which they were added.
         self._sources: dict[Source, None] = {}
         self._backlog = Backlog()
@@ -128,10 +131,10 @@ class PolledInbox:
             source.pending = 0
 
     def receive(self, longest_ns: int) -> None:
-        end = time.monotonic_ns() + longest_ns
+        end = self._monotonic_ns() + longest_ns
         rest = longest_ns
         while rest > 0 and not (self._turn(rest) or self.failed):
-            rest = end - time.monotonic_ns()
+            rest = end - self._monotonic_ns()
 
     def receive_once(self, longest_ns: int) -> None:
         self._turn(longest_ns)
@@ -141,14 +144,14 @@ class PolledInbox:
         backlog = self._backlog
         sources, until, woken = self._watch.wait(0 if backlog.held else longest_ns)
         if sources and self._coalesce_s and not backlog.held:
-            time.sleep(self._coalesce_s)
+            self._sleep(self._coalesce_s)
             more, until, woken_since = self._watch.wait(0)
             sources, woken = [*sources, *(each for each in more if each not in sources)], woken or woken_since
         backlog.deliver(sources, until)
         return woken
 
     def deliver_all(self) -> None:
-        self._backlog.deliver_until(time.time_ns(), self._sources)
+        self._backlog.deliver_until(self._time_ns(), self._sources)
 
     def deliver_held(self) -> None:
         self._backlog.deliver_held()

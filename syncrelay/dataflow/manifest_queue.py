@@ -7,7 +7,6 @@ of manifests costs far less than the same manifests one by one.
 import logging
 from collections import deque
 from collections.abc import Collection
-from threading import Lock
 from typing import Final
 
 from syncrelay.config.wording import counted
@@ -15,8 +14,8 @@ from syncrelay.dataflow.backend import Outlet, PublishError
 from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.flow import Flow
 from syncrelay.dataflow.manifest import ManifestWriter, Note
+from syncrelay.runtime import SYSTEM, Runtime
 from syncrelay.sync import Match
-from syncrelay.wakeup import Wakeup
 
 _LOG = logging.getLogger("syncrelay")
 
@@ -107,15 +106,15 @@ class ManifestQueue:
     An outlet may end when its group has ended and `keep` has returned: by then nothing is left to publish on it.
     """
 
-    def __init__(self, *, bugs: Bugs) -> None:
+    def __init__(self, *, bugs: Bugs, runtime: Runtime = SYSTEM) -> None:
         self.noted: deque[tuple[GroupManifests, Note]] = deque()
         """What is to be published, the oldest first."""
         self._bugs = bugs
         self._groups: tuple[GroupManifests, ...] = ()
         self._is_heard = False
         # Held while one is published; the receive thread takes it only where a group gets another output.
-        self._lock = Lock()
-        self._wake = Wakeup()
+        self._lock = runtime.lock()
+        self._wake = runtime.rest()
         self._stopping = False
 
     def begin(self, name: str, writer: ManifestWriter, outlet: Outlet) -> GroupManifests:

@@ -1,11 +1,11 @@
 """What the relay observes of itself: standstills, waits, losses, and clocks that step or stop. Times in nanoseconds."""
 
-import time
 from collections import deque
 from collections.abc import Hashable
 from typing import Final
 
 from syncrelay.explain import STEP_NS, ClockState, Standstill, Step
+from syncrelay.runtime import SYSTEM, Runtime
 
 # What was lost, and what had to wait, is reported for the last ten evaluations.
 _RECENT: Final = 10
@@ -26,20 +26,21 @@ _CLOCK_STOPPED_NS: Final = 2_500_000_000
 class Standstills:
     """How long the process did not run, as seen by a thread that works in short steps and rests between them."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, runtime: Runtime = SYSTEM) -> None:
+        self._runtime = runtime
         self._recent: deque[Standstill | None] = deque(maxlen=_RECENT)
         self._longest_now: Standstill | None = None
-        self._began = time.monotonic_ns()
+        self._began = self._runtime.monotonic_ns()
 
     def begin(self) -> None:
         """Begin a step now."""
-        self._began = time.monotonic_ns()
+        self._began = self._runtime.monotonic_ns()
 
     def end(self, *, rest: int = 0) -> None:
         """Note how long a step took, without the rest that it took on purpose; the next one begins now."""
         before = self._began
         self.begin()
-        self.note(Standstill(time.time_ns(), self._began - before - rest, rest))
+        self.note(Standstill(self._runtime.time_ns(), self._began - before - rest, rest))
 
     def note(self, standstill: Standstill) -> None:
         """Take a standstill that ends now."""
@@ -128,13 +129,14 @@ class Discovery:
 class SystemClock:
     """Whether the system's clock was set."""
 
-    def __init__(self) -> None:
-        self._offset = _offset()
+    def __init__(self, *, runtime: Runtime = SYSTEM) -> None:
+        self._runtime = runtime
+        self._offset = _offset(runtime)
         self._step: Step | None = None
 
     def has_stepped(self, now: int) -> bool:
         """Whether it was set since this was last asked."""
-        before, self._offset = self._offset, _offset()
+        before, self._offset = self._offset, _offset(self._runtime)
         by = self._offset - before
         if abs(by) >= STEP_NS:
             self._step = Step(now, by)
@@ -145,24 +147,24 @@ class SystemClock:
         return self._step if self._step and 0 <= now - self._step.at < _TOLD_NS else None
 
 
-def _offset() -> int:
+def _offset(runtime: Runtime) -> int:
     """How far the system's clock is ahead of the monotonic one."""
     # The quickest of a few readings: a thread that was interrupted between the two clocks would see a step.
-    return min(_reading() for _ in range(_READINGS))[1]
+    return min(_reading(runtime) for _ in range(_READINGS))[1]
 
 
-def _reading() -> tuple[int, int]:
-    before = time.monotonic_ns()
-    system = time.time_ns()
-    after = time.monotonic_ns()
+def _reading(runtime: Runtime) -> tuple[int, int]:
+    before = runtime.monotonic_ns()
+    system = runtime.time_ns()
+    after = runtime.monotonic_ns()
     return after - before, system - (before + after) // 2
 
 
 class SimulatedClock:
     """Whether simulated time moves, and what it was when messages were received."""
 
-    def __init__(self) -> None:
-        self._moved_at = time.time_ns()
+    def __init__(self, *, runtime: Runtime = SYSTEM) -> None:
+        self._moved_at = runtime.time_ns()
         self._now = (self._moved_at, 0)
         self._rate = 1.0
         self.is_steady = False

@@ -4,12 +4,12 @@ rclpy's executors rebuild their wait set for every callback, which is most of th
 Here a wake drains all sources that are ready.
 """
 
-import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
 from syncrelay.dataflow.backend import Inbox, Source
 from syncrelay.dataflow.calls import Calls
+from syncrelay.runtime import SYSTEM, Runtime
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
@@ -39,6 +39,7 @@ class ReceiveLoop:
         deadline: Callable[[], int | None] | None = None,
         on_turn: Callable[[], None] | None = None,
         contain: Callable[[Exception], None] | None = None,
+        runtime: Runtime = SYSTEM,
     ) -> None:
         self._inbox = inbox
         self._now = now
@@ -47,13 +48,15 @@ class ReceiveLoop:
 
         It is called after every delivery; wake the loop after replacing it.
         """
-        self.turned = time.monotonic()
-        """When the loop last turned, by time.monotonic(): at least once a second while it works."""
+        self._monotonic = runtime.monotonic
+        self._sleep = runtime.sleep
+        self.turned = runtime.monotonic()
+        """When the loop last turned, by the runtime's monotonic clock: at least once a second while it works."""
         self._expire = expire
         self._on_turn = on_turn
         self._contain = contain
         self._sources: dict[Source, Callable[[Exception], None]] = {}
-        self._calls = Calls(inbox.wake)
+        self._calls = Calls(inbox.wake, runtime=runtime)
         self._stopping = False
 
     def call(self, function: Callable[[], _Result]) -> "Future[_Result]":
@@ -95,7 +98,7 @@ class ReceiveLoop:
             while not self._stopping:
                 self._guarded(self._receive)
                 if not self._stopping:
-                    time.sleep(_AFTER_FAILURE_S)
+                    self._sleep(_AFTER_FAILURE_S)
             for last in (self._inbox.deliver_all, self._inbox.deliver_held, self._calls.carry_out):
                 self._guarded(last)
         finally:
@@ -120,7 +123,7 @@ class ReceiveLoop:
                 self._inbox.receive_once(self._expire_due(deadline))
             if self._inbox.failed:
                 self._end_failed()
-            self.turned = time.monotonic()
+            self.turned = self._monotonic()
             if self._on_turn is not None:
                 self._on_turn()
 

@@ -147,23 +147,24 @@ def _observe(config: Config | None, ros_args: Sequence[str], node: str, *, secon
     from syncrelay.ros.environment import require_rclpy  # noqa: PLC0415  rclpy is imported where the graph is wanted
 
     require_rclpy()
-    from syncrelay.ros.entities import Purpose  # noqa: PLC0415
-    from syncrelay.ros.graph import snapshot  # noqa: PLC0415
-    from syncrelay.ros.hidden_node import watch_graph  # noqa: PLC0415
+    from syncrelay.relay.graph import snapshot  # noqa: PLC0415
+    from syncrelay.relay.ports import Purpose  # noqa: PLC0415
+    from syncrelay.relay.relay import Relay  # noqa: PLC0415
+    from syncrelay.ros.joining import joined, watch_graph  # noqa: PLC0415
     from syncrelay.ros.lifecycle import state_of  # noqa: PLC0415
-    from syncrelay.ros.relay import Relay  # noqa: PLC0415
 
     if config is None:
         return Observed(seconds, watch_graph(seconds=seconds))
     try:
-        relay = Relay(config, ros_args=ros_args, purpose=Purpose.OBSERVE)
+        own, backend = joined(config, ros_args=ros_args, purpose=Purpose.OBSERVE)
+        relay = Relay(config, own, backend, purpose=Purpose.OBSERVE)
     except ConfigError:
         return None
     with relay:
         reports = relay.look(seconds)
-        graph = snapshot(relay.node)
+        graph = snapshot(own)
         is_there = config.node.lifecycle and node in graph.nodes
-        state = state_of(relay.node, node, patience_s=_PATIENCE_S) if is_there else None
+        state = state_of(own.raw, node, patience_s=_PATIENCE_S) if is_there else None
         return Observed(seconds, graph, reports, relay.monitor.unjudged, state)
 
 

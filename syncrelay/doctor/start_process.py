@@ -7,8 +7,8 @@ from typing import Any
 
 from syncrelay.doctor.start import Step
 from syncrelay.errors import RosUnavailableError, TypeImportError, UsageError
+from syncrelay.relay.types import import_type
 from syncrelay.ros.environment import require_rclpy
-from syncrelay.ros.types import import_type
 
 
 def main() -> int:

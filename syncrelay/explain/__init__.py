@@ -4,6 +4,7 @@ Pure: values in, values out. The running relay and the analysis of recordings bo
 """
 
 from syncrelay.config import Tolerance
+from syncrelay.config.profile import Mismatch
 from syncrelay.explain.cause_log import CauseLog
 from syncrelay.explain.clocks import STEP_NS, Step
 from syncrelay.explain.codes import Code, Severity
@@ -16,7 +17,6 @@ from syncrelay.explain.facts import (
     GroupFacts,
     InputFacts,
     InputGraph,
-    Mismatch,
     Pause,
     Refusal,
     Standstill,

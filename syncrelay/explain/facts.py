@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple, TypedDict
 
 from syncrelay.config import Distance, Tolerance
+from syncrelay.config.profile import Mismatch
 from syncrelay.explain.clocks import Step
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.standing import Standing
@@ -16,15 +17,6 @@ _SECOND: Final = 1_000_000_000
 _NO_SETS: Final = 5 * _SECOND
 # What is found within this time of a group's beginning was there before.
 _FOUND_AT_ONCE: Final = 2 * _SECOND
-
-
-@dataclass(frozen=True, slots=True)
-class Mismatch:
-    """A QoS policy by which a publisher and a subscriber do not connect, in DDS's words: offered and requested."""
-
-    policy: str
-    offered: str
-    requested: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,14 +4,13 @@ One record serves all of them, by the number that each has read to: what a tap c
 one and for many, and one that stalls holds nothing.
 """
 
-import time
 from collections import deque
-from collections.abc import Callable
 from itertools import islice
 from typing import Final, NamedTuple, TypeAlias
 
 from syncrelay.config import GroupConfig
 from syncrelay.explain.report import RecentDrop
+from syncrelay.runtime import SYSTEM, Runtime
 
 Stamps: TypeAlias = tuple[int | None, ...]
 """Stamps of a set in input order, in nanoseconds; None where a message was missing."""
@@ -38,31 +37,28 @@ class Left(NamedTuple):
 
 
 class Tape:
-    """Keeps what leaves while somebody reads it. `note` is the receive thread's; all else may be called on any.
+    """Keeps what leaves while somebody reads it. `note` is the receive thread's; all else may be called on any."""
 
-    `now_s` is a clock of seconds.
-    """
-
-    def __init__(self, *, now_s: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, *, runtime: Runtime = SYSTEM) -> None:
         self.is_on = False
         """Whether anyone reads: whoever notes asks first."""
         self.last = 0
         """The number of what left last."""
         self._kept: deque[Left] = deque(maxlen=KEPT)
-        self._now_s = now_s
+        self._monotonic = runtime.monotonic
         self._asked = 0.0
 
     def note(self, group: GroupConfig, outcome: Stamps | RecentDrop, left: int, received: int) -> None:
         """Keep what has just left, in place of the oldest."""
         self.last = number = self.last + 1
         self._kept.append(Left(number, group, outcome, left, received))
-        if not number % _LOOKS_EVERY and self._now_s() - self._asked > UNHEARD_S:
+        if not number % _LOOKS_EVERY and self._monotonic() - self._asked > UNHEARD_S:
             self.is_on = False
             self._kept.clear()
 
     def listen(self) -> None:
         """Keep what leaves from now on, until nobody has called this for some time."""
-        self._asked = self._now_s()
+        self._asked = self._monotonic()
         self.is_on = True
 
     def after(self, number: int, *, most: int) -> tuple[list[Left], int]:

@@ -1,9 +1,9 @@
 """How much may be tried out for suggestions: the engine runs on what came, and the relay has other things to do."""
 
-import time
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final
 
+from syncrelay.runtime import SYSTEM
 from syncrelay.sync import Message
 
 # A run costs 3 to 20 us a message, by what the engine has to do: a few runs for a group alone ...
@@ -15,12 +15,14 @@ _ASKED_EVERY: Final = 50
 
 
 class TryBudget:
-    """How much may be tried out until the next poll, by all groups that share it: so much of the processor's time.
+    """How much may be tried out until the next poll, by all groups that share it.
 
-    Without a `clock` of that, in nanoseconds, so many messages may be run through engines: the same on any machine.
+    It is a number of messages that are run through engines, and a share of the processor's time by `clock`, in
+    nanoseconds, which usually ends first. Without a clock, or with one that stands still, only the messages count: what
+    is tried out is then the same on any machine.
     """
 
-    def __init__(self, clock: Callable[[], int] | None = time.thread_time_ns) -> None:
+    def __init__(self, clock: Callable[[], int] | None = SYSTEM.thread_time_ns) -> None:
         self._clock = clock
         self._is_wanted = False
         self.refill()
@@ -40,7 +42,7 @@ class TryBudget:
     @property
     def is_spent(self) -> bool:
         """Whether no run may begin any more."""
-        return self._spent() >= _BEGINS_NS if self._clock else self._left <= 0
+        return self._left <= 0 or self._spent() >= _BEGINS_NS
 
     def spent_on(self, messages: Iterable[Message]) -> Iterator[Message]:
         """Yield messages that a run takes. Raises OutOfTimeError where it takes too long.

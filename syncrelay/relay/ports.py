@@ -5,11 +5,13 @@ How messages come and leave as bytes is in `syncrelay.dataflow.backend`.
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
 from enum import Enum
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 from syncrelay.config.profile import Profile
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
 
 
 class Purpose(Enum):
@@ -112,18 +114,14 @@ class Publisher(Entity, Protocol):
         ...
 
 
-class Verbs(Protocol):
-    """What a managed node does at its transitions, called on the thread that serves it.
+class Outcome(Enum):
+    """How a transition of a managed node ended."""
 
-    A SyncRelayError leaves the node as it was; after any other exception `recover` leads back to unconfigured.
-    """
-
-    def configure(self) -> None: ...
-    def activate(self) -> None: ...
-    def deactivate(self) -> None: ...
-    def cleanup(self) -> None: ...
-    def shutdown(self) -> None: ...
-    def recover(self) -> None: ...
+    SUCCESS = "success"
+    FAILURE = "failure"
+    """The node stays as it was."""
+    ERROR = "error"
+    """The node is to `recover`, and is unconfigured after that."""
 
 
 class Answer(NamedTuple):
@@ -208,8 +206,11 @@ class Node(Protocol):
         """Give answers that are ready so long to be sent."""
         ...
 
-    def manage(self, verbs: Verbs) -> None:
-        """Have a managed node do this at its transitions; before `serve`."""
+    def manage(self, carry_out: Callable[[str], Outcome]) -> None:
+        """Have a managed node call this at its transitions, on the thread that serves it; before `serve`.
+
+        It is called with `configure`, `activate`, `deactivate`, `cleanup`, `shutdown` or `recover`.
+        """
         ...
 
     def declare(self, paths: Sequence[str], version: str) -> None:
@@ -221,7 +222,7 @@ class Node(Protocol):
         ...
 
     def serve(self) -> None:
-        """Serve services, parameters and the clock on this thread until `end_serving`. May raise, and be called again."""
+        """Serve services, parameters and the clock until `end_serving`. If it raises, it may be called again."""
         ...
 
     def end_serving(self) -> None:

@@ -1,7 +1,6 @@
 """Nodes that only look at the graph: hidden from `ros2 node list`, without services and topics of their own."""
 
 import os
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Final
@@ -12,12 +11,11 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from syncrelay.config import Config
 from syncrelay.errors import RosUnavailableError
-from syncrelay.explain import GraphSnapshot
-from syncrelay.ros.graph import snapshot
 from syncrelay.ros.leaving import leave
 from syncrelay.ros.start import make_node, resolver, start
 
-_NAME: Final = "_syncrelay_observer"
+OBSERVER: Final = "_syncrelay_observer"
+"""The name of a node that observes."""
 # The first two override the third.
 _DISCOVERY: Final = ("ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "ROS_AUTOMATIC_DISCOVERY_RANGE")
 
@@ -60,7 +58,7 @@ def join_hidden(config: Config, ros_args: Sequence[str]) -> tuple[Context, Any, 
             context.try_shutdown()
     hidden = _started()
     arguments = ["-p", f"use_sim_time:={is_simulated}", *remaps]
-    return hidden, _hidden(hidden, _NAME, namespace=namespace, arguments=arguments), name
+    return hidden, _hidden(hidden, OBSERVER, namespace=namespace, arguments=arguments), name
 
 
 @contextmanager
@@ -74,13 +72,6 @@ def hidden_node(name: str) -> Iterator[Any]:
         raise RosUnavailableError(f"cannot look at the graph: {error}") from error
     finally:
         leave(node, context)
-
-
-def watch_graph(*, seconds: float) -> GraphSnapshot:
-    """Join the graph for a time and return what it holds. Raises as `hidden_node`."""
-    with hidden_node(_NAME) as node:
-        time.sleep(seconds)
-        return snapshot(node)
 
 
 @contextmanager

@@ -54,9 +54,9 @@ def _publish(name: str, shots: Iterator[Shot], stop: Wakeup) -> None:
     from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: PLC0415
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
 
+    from syncrelay.relay.types import import_type  # noqa: PLC0415
     from syncrelay.rig.scene import SCENES  # noqa: PLC0415
     from syncrelay.ros.leaving import is_leaving, leave  # noqa: PLC0415
-    from syncrelay.ros.types import import_type  # noqa: PLC0415
 
     sensor, (type_name, make_frames) = SENSORS[name], SCENES[name]
     frames = make_frames()

@@ -6,10 +6,8 @@ one that stalls loses lines instead of holding up the relay.
 
 import json
 import re
-import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from threading import Lock
 from typing import Final, Self
 from urllib.parse import parse_qs
 
@@ -18,6 +16,7 @@ from syncrelay.config.wording import one_of
 from syncrelay.errors import SyncRelayError
 from syncrelay.explain import GroupLines, GroupReport, Left, RecentDrop, Tape
 from syncrelay.explain.tape import UNHEARD_S
+from syncrelay.runtime import SYSTEM, Runtime
 from syncrelay.sync import DropReason
 
 MOST_TAPS: Final = 64
@@ -117,16 +116,14 @@ def _require_known(wanted: frozenset[str], groups: Collection[str]) -> None:
 class Taps:
     """Answers taps, on any thread. `full_name` gives a topic's name in the graph."""
 
-    def __init__(
-        self, tape: Tape, full_name: Callable[[str], str], *, processor_s: Callable[[], float] = time.thread_time
-    ) -> None:
+    def __init__(self, tape: Tape, full_name: Callable[[str], str], *, runtime: Runtime = SYSTEM) -> None:
         self.tape = tape
         self._full_name = full_name
         self._lines: dict[int, GroupLines] = {}
-        self._processor_s = processor_s
-        self._left_s, self._refilled = _SHARE, time.monotonic()
+        self._runtime = runtime
+        self._left_s, self._refilled = _SHARE, self._runtime.monotonic()
         self._asked: dict[str, float] = {}
-        self._lock = Lock()
+        self._lock = runtime.lock()
 
     def answer(self, text: str, *, reports: Callable[[], Mapping[str, GroupReport | None]] = dict) -> bytes:
         """Return the sets and drops since the last answer as JSON. Raises TapRefusedError.
@@ -149,18 +146,18 @@ class Taps:
             return _answer(last, lost=0 if query.after is None else None)
         if not self._may_go_on():
             return _answer(query.after)
-        began = self._processor_s()
+        began = self._runtime.thread_time_ns()
         left, lost = self.tape.after(query.after, most=_MOST_LINES)
         after = left[-1].number if left else query.after
         judged = reports() if left else {}
         lines = [line for each in left if (line := self._line(each, query.wanted, judged)) is not None]
         answer = _answer(after, more=after < last, lost=lost, lines=lines)
         with self._lock:
-            self._left_s -= self._processor_s() - began
+            self._left_s -= (self._runtime.thread_time_ns() - began) / 1e9
         return answer
 
     def _may_go_on(self) -> bool:
-        now = time.monotonic()
+        now = self._runtime.monotonic()
         with self._lock:
             self._left_s = min(_SHARE, self._left_s + _SHARE * (now - self._refilled))
             self._refilled = now
@@ -168,7 +165,7 @@ class Taps:
 
     def _enter(self, name: str) -> bool:
         """Keep the tape running for a tap. Returns whether it has been running since this tap last asked."""
-        now = time.monotonic()
+        now = self._runtime.monotonic()
         with self._lock:
             self._asked = {each: asked for each, asked in self._asked.items() if now - asked < UNHEARD_S}
             was_there = name in self._asked and self.tape.is_on

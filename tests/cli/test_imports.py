@@ -12,7 +12,16 @@ _OF_OTHERS = {
     *("argcomplete", "jinja2", "lz4", "mcap", "prometheus_client", "rich", "rosbags", "ruamel"),
     *("textual", "zstandard", "syncrelay.recordings", "syncrelay.doctor", "syncrelay.rig", "syncrelay.top"),
 }
-_OF_THE_RELAY = {"numpy", "rclpy", "std_msgs", "waitress", "syncrelay.explain", "syncrelay.ros", "syncrelay.status"}
+_OF_THE_RELAY = {
+    "numpy",
+    "rclpy",
+    "std_msgs",
+    "waitress",
+    "syncrelay.explain",
+    "syncrelay.relay",
+    "syncrelay.ros",
+    "syncrelay.status",
+}
 _OF_FILES = {"pydantic", "yaml", "syncrelay.config"}
 _SCRIPT = """
 import json, sys

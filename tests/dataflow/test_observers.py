@@ -7,6 +7,7 @@ import pytest
 
 from syncrelay.dataflow.observers import Discovery, Losses, SimulatedClock, Standstills, SystemClock, Waits
 from syncrelay.explain import ClockState, Standstill
+from syncrelay.runtime import SystemRuntime
 
 _SECOND = 1_000_000_000
 
@@ -64,10 +65,10 @@ def test_only_what_a_known_publisher_lost_of_late_is_a_loss(totals_and_publisher
     assert (losses.recent, losses.total) == (recent, in_all)
 
 
-def test_a_clock_that_was_set_has_stepped_once_and_is_told_for_half_a_minute(monkeypatch):
-    ahead = [0]
-    monkeypatch.setattr(time, "time_ns", lambda: time.monotonic_ns() + ahead[0])
-    clock = SystemClock()
+def test_a_clock_that_was_set_has_stepped_once_and_is_told_for_half_a_minute():
+    runtime, ahead = SystemRuntime(), [0]
+    runtime.time_ns = lambda: time.monotonic_ns() + ahead[0]
+    clock = SystemClock(runtime=runtime)
     assert not clock.has_stepped(0)
     for at, step in ((10 * _SECOND, 5 * _SECOND), (20 * _SECOND, -5 * _SECOND)):
         ahead[0] += step

@@ -29,7 +29,7 @@ from syncrelay.explain import (
     Standstill,
 )
 from syncrelay.explain.finding_log import Remark
-from syncrelay.ros.types import SettlingType
+from syncrelay.relay.types import SettlingType
 from syncrelay.sync import DropReason, Match, Message, Outcome
 
 S = 1_000_000_000

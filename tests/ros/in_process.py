@@ -1,7 +1,7 @@
 """A node of the test's own process."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any
@@ -11,8 +11,12 @@ import rclpy
 from geometry_msgs.msg import Vector3Stamped
 from rclpy.qos import HistoryPolicy, QoSProfile
 
+from syncrelay.config import Config
 from syncrelay.dataflow.backend import ALL
+from syncrelay.relay.relay import Relay
 from syncrelay.ros.backend_choice import choose_backend
+from syncrelay.ros.joining import joined as joined_by
+from syncrelay.ros.node import RosNode
 
 _KEEP_ALL = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 
@@ -35,6 +39,16 @@ def own_node(domain: int, name: str = "here", **keys: Any) -> Iterator[SimpleNam
     finally:
         node.destroy_node()
         context.try_shutdown()
+
+
+def port_of(node: Any) -> RosNode:
+    """A node of rclpy, as the relay takes it."""
+    return RosNode(node, relay_name=node.get_fully_qualified_name(), resolve=node.resolve_topic_name)
+
+
+def own_relay(config: Config, *, ros_args: Sequence[str] = (), **keys: Any) -> Relay:
+    """A relay in this process."""
+    return Relay(config, *joined_by(config, ros_args=ros_args), **keys)
 
 
 def vectors_on(node: Any, name: str, profile: QoSProfile = _KEEP_ALL) -> SimpleNamespace:

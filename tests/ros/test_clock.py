@@ -11,9 +11,10 @@ from builtin_interfaces.msg import Time
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 
-from syncrelay.ros.clock import WaitingClock
+from syncrelay.relay.clock import WaitingClock
+from syncrelay.runtime import SYSTEM
 from tests.faults.extent import chosen
-from tests.ros.in_process import own_node
+from tests.ros.in_process import own_node, port_of
 
 _SECOND = 10**9
 
@@ -23,12 +24,13 @@ def _simulated(domain: int) -> Iterator[tuple[Any, Callable[[int], None]]]:
     """A node by simulated time, and what gives it a message of /clock as its executor would."""
     with own_node(domain, parameter_overrides=[Parameter("use_sim_time", value=True)]) as own:
         (subscription,) = own.node.subscriptions
+        port = port_of(own.node)
 
         def tick(now: int) -> None:
             sec, nanosec = divmod(now, _SECOND)
             subscription.callback(Clock(clock=Time(sec=sec, nanosec=nanosec)))
 
-        yield own.node, tick
+        yield port, tick
 
 
 def test_the_clock_jumps_where_it_falls_by_a_second_or_more(ros_domain: int, caplog: pytest.LogCaptureFixture):
@@ -36,7 +38,7 @@ def test_the_clock_jumps_where_it_falls_by_a_second_or_more(ros_domain: int, cap
     chance = random.Random(28)
     told: list[str] = []
     with _simulated(ros_domain) as (node, tick), caplog.at_level(logging.WARNING, "syncrelay"):
-        clock = WaitingClock(node)
+        clock = WaitingClock(node, runtime=SYSTEM)
         clock.follow(jumped_back=lambda: told.append("jumped"), ticked=lambda: told.append("ticked"))
         tick(now := 1000 * _SECOND)
         for number in range(chosen(short=2000, long=100_000)):

@@ -33,11 +33,11 @@ if not IS_COMPILED:
 
 from geometry_msgs.msg import Vector3Stamped
 
+from syncrelay.relay.outputs import handler
 from syncrelay.ros import backend_choice
 from syncrelay.ros.backend_choice import choose_backend
 from syncrelay.ros.compiled import backend as compiled_backend
 from syncrelay.ros.compiled import path
-from syncrelay.ros.outputs import handler
 from tests.ros.in_process import own_backend, own_node, take
 
 pytestmark = pytest.mark.ros

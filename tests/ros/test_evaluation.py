@@ -10,7 +10,7 @@ from tests.ros.configs import config, inputs
 from tests.ros.processes import wait_until
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-Relay = pytest.importorskip("syncrelay.ros.relay").Relay
+own_relay = pytest.importorskip("tests.ros.in_process", reason="rclpy is not installed").own_relay
 
 pytestmark = pytest.mark.ros
 
@@ -25,7 +25,7 @@ def relay_of(ros_domain: int, tmp_path, monkeypatch) -> Iterator:
     started = []
 
     def start(n_groups, **keys):
-        started.append(Relay(_loaded(tmp_path, [f"g{n}" for n in range(n_groups)], **keys)))
+        started.append(own_relay(_loaded(tmp_path, [f"g{n}" for n in range(n_groups)], **keys)))
         return started[-1].__enter__()
 
     yield start
@@ -74,7 +74,7 @@ def test_a_few_are_evaluated_every_time(relay_of):
 
 def test_whoever_asks_for_the_state_sees_all_as_they_are(relay_of, monkeypatch):
     # However long the next evaluation takes to come.
-    monkeypatch.setattr("syncrelay.ros.relay._ASKED_S", 600.0)
+    monkeypatch.setattr("syncrelay.relay.relay._ASKED_S", 600.0)
     relay = relay_of(_GROUPS)
     _evaluated_next(relay)
     assert len(_evaluated_next(relay)) == 10

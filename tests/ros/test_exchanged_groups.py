@@ -10,19 +10,22 @@ from typing import Any
 import pytest
 
 from syncrelay.config import Config, StampField, load_text
+from syncrelay.config.profile import Profile
 from syncrelay.config.reload import Subscription, exchange
 from syncrelay.errors import ReloadError
 from syncrelay.explain import Endpoint, Refusal
+from syncrelay.relay.ports import Purpose
+from syncrelay.runtime import SYSTEM
 from tests.ros.configs import config
 from tests.ros.processes import wait_until
 from tests.ros.stage import BACKENDS
 
-own_node = pytest.importorskip("tests.ros.in_process", reason="rclpy is not installed").own_node
-entities = pytest.importorskip("syncrelay.ros.entities")
+in_process = pytest.importorskip("tests.ros.in_process", reason="rclpy is not installed")
+entities = pytest.importorskip("syncrelay.relay.entities")
 choose_backend = pytest.importorskip("syncrelay.ros.backend_choice").choose_backend
-GroupBindings = pytest.importorskip("syncrelay.ros.bindings").GroupBindings
+GroupBindings = pytest.importorskip("syncrelay.relay.bindings").GroupBindings
 GroupRelay = pytest.importorskip("syncrelay.dataflow.group").GroupRelay
-import_type = pytest.importorskip("syncrelay.ros.types").import_type
+import_type = pytest.importorskip("syncrelay.relay.types").import_type
 ReceiveLoop = pytest.importorskip("syncrelay.dataflow.receive").ReceiveLoop
 
 pytestmark = pytest.mark.ros
@@ -36,7 +39,7 @@ class _Refusing(entities.Entities):  # type: ignore[name-defined]  # of a module
     """Refuses, too, what a test says."""
 
     def __init__(self, node: Any) -> None:
-        super().__init__(node, entities.Purpose.RELAY)
+        super().__init__(node, Purpose.RELAY)
         self.refuses = lambda: False
 
     def publisher(self, message_type: Any, topic: str, profile: Any) -> Any:
@@ -48,11 +51,12 @@ class _Refusing(entities.Entities):  # type: ignore[name-defined]  # of a module
 @pytest.fixture(params=BACKENDS)
 def here(request, ros_domain: int) -> Iterator[SimpleNamespace]:
     """GroupBindings of a node of this process, with a loop that runs."""
-    with own_node(ros_domain) as own:
+    with in_process.own_node(ros_domain) as own:
         own.backend = choose_backend(request.param, node=own.node, context=own.context)
-        own.entities = _Refusing(own.node)
+        port = in_process.port_of(own.node)
+        own.entities = _Refusing(port)
         loop = ReceiveLoop(own.backend.inbox(), now=lambda: 0, expire=lambda _: None)
-        own.bindings = GroupBindings(entities=own.entities, node=own.node, backend=own.backend, loop=loop)
+        own.bindings = GroupBindings(entities=own.entities, node=port, backend=own.backend, loop=loop, runtime=SYSTEM)
         thread = Thread(target=loop.run)
         thread.start()
         try:
@@ -135,7 +139,7 @@ def test_a_subscription_is_made_when_what_held_its_topic_has_ended(here):
     imu = here.bindings
     imu.run(_groups(**_ONE))
     _poll(here)
-    holder = here.entities.publisher(next(iter(here.node.publishers)).msg_type, "/later", 10)
+    holder = here.entities.publisher(next(iter(here.node.publishers)).msg_type, "/later", Profile())
     imu.run([*imu.groups, *_groups(late=[("/later", _IMU, "/c"), ("/z", _IMU, "/d")])])
     _poll(here)
     late = imu.all[1]

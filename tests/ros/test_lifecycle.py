@@ -234,7 +234,7 @@ def test_whatever_is_asked_for_the_state_is_the_one_that_the_transitions_lead_to
 
 # The real relay, whose bug shows when the node is activated.
 _FAILING = """\
-from syncrelay.ros.groups import Groups
+from syncrelay.relay.groups import Groups
 def begin(self):
     raise ZeroDivisionError("no begin")
 Groups.begin = begin

@@ -13,7 +13,7 @@ from syncrelay.errors import TypeImportError
 from syncrelay.explain import Endpoint
 
 serialization = pytest.importorskip("rclpy.serialization", reason="rclpy is not installed")
-types = pytest.importorskip("syncrelay.ros.types")
+types = pytest.importorskip("syncrelay.relay.types")
 
 import_type = types.import_type
 

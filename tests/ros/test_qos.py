@@ -1,11 +1,10 @@
 """QoS: matched to the publishers, or as the file says."""
 
-from itertools import combinations_with_replacement, count, product
-from typing import Any
+from itertools import combinations_with_replacement, count
 
 import pytest
 
-from syncrelay.config import QosOverrides, QosPreset
+from syncrelay.config import AUTO, QosOverrides, QosPreset
 from tests.ros import relaying
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs, outputs
@@ -14,57 +13,50 @@ from tests.ros.streams import BEGIN, MS, at, merged
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSProfile, QoSReliabilityPolicy
-
-from syncrelay.ros.graph import mismatch
-from syncrelay.ros.qos import input_profile, output_profile
+from syncrelay.config.profile import Profile, is_known, matched, mismatch, sent
 
 _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
 _PAIR_OUT = dict.fromkeys(outputs("front", _PAIR), VECTOR)
 _RECORDING = merged(at("/camera", 0), at("/lidar", 0))
 _TEXT = config({"front": {"policy": "exact_time", "topics": inputs(_PAIR)}})
-_RELIABLE, _BEST_EFFORT = QoSReliabilityPolicy.RELIABLE, QoSReliabilityPolicy.BEST_EFFORT
-_LATCHED, _VOLATILE = QoSDurabilityPolicy.TRANSIENT_LOCAL, QoSDurabilityPolicy.VOLATILE
-
-
-def _offer(reliability: Any, durability: Any) -> QoSProfile:
-    return QoSProfile(depth=1, reliability=reliability, durability=durability)
+_KINDS = [
+    Profile(depth=1, reliability=reliability, durability=durability)
+    for reliability in ("reliable", "best_effort")
+    for durability in ("transient_local", "volatile")
+]
 
 
 def test_auto_takes_the_most_that_all_publishers_offer():
-    offers = [_offer(*each) for each in product((_RELIABLE, _BEST_EFFORT), (_LATCHED, _VOLATILE))]
     for number in (1, 2, 3):
-        for offered in combinations_with_replacement(offers, number):
-            profile = input_profile(QosOverrides(), offered)
-            assert profile is not None
+        for offered in combinations_with_replacement(_KINDS, number):
+            profile = matched(AUTO, offered)
             assert not any(mismatch(each, profile) for each in offered)
-            assert (profile.reliability == _RELIABLE) is all(each.reliability == _RELIABLE for each in offered)
-            assert (profile.durability == _LATCHED) is all(each.durability == _LATCHED for each in offered)
-    assert input_profile(QosOverrides(), []) is None
+            assert (profile.reliability == "reliable") is all(each.reliability == "reliable" for each in offered)
+            latched = all(each.durability == "transient_local" for each in offered)
+            assert (profile.durability == "transient_local") is latched
+    assert not is_known(AUTO, [])
 
 
 @pytest.mark.parametrize(
     ("asked", "reliability", "durability"),
     [
-        (QosPreset("sensor_data"), _BEST_EFFORT, _VOLATILE),
-        (QosOverrides(reliability="best_effort"), _BEST_EFFORT, _LATCHED),
-        (QosOverrides(durability="volatile"), _RELIABLE, _VOLATILE),
+        (QosPreset("sensor_data"), "best_effort", "volatile"),
+        (QosOverrides(reliability="best_effort"), "best_effort", "transient_local"),
+        (QosOverrides(durability="volatile"), "reliable", "volatile"),
     ],
     ids=["a preset", "only reliability", "only durability"],
 )
 def test_what_the_file_says_overrides_what_the_publishers_offer(asked, reliability, durability):
-    profile = input_profile(asked, [_offer(_RELIABLE, _LATCHED)])
-    assert profile is not None
+    profile = matched(asked, _KINDS[:1])
     assert (profile.reliability, profile.durability) == (reliability, durability)
 
 
 def test_an_output_of_an_input_that_keeps_all_keeps_the_last_5000():
-    received = input_profile(QosOverrides(history="keep_all", deadline=5 * MS), [_offer(_RELIABLE, _LATCHED)])
-    assert received is not None
-    sent = output_profile(received)
-    assert received.history == QoSHistoryPolicy.KEEP_ALL
-    assert (sent.history, sent.depth) == (QoSHistoryPolicy.KEEP_LAST, 5000)
-    assert mismatch(sent, received) is None
+    received = matched(QosOverrides(history="keep_all", deadline=5 * MS), _KINDS[:1])
+    output = sent(received)
+    assert received.history == "keep_all"
+    assert (output.history, output.depth) == ("keep_last", 5000)
+    assert mismatch(output, received) is None
 
 
 def _wait_for_qos(collector: Collector, *expected: str) -> None:

@@ -12,7 +12,7 @@ from tests.ros.processes import ros_environment
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 ros_start = pytest.importorskip("syncrelay.ros.start")
-Relay = pytest.importorskip("syncrelay.ros.relay").Relay
+own_relay = pytest.importorskip("tests.ros.in_process", reason="rclpy is not installed").own_relay
 
 pytestmark = pytest.mark.ros
 
@@ -134,7 +134,7 @@ def test_the_relay_ends_with_a_sentence(words, environ, code, said, tmp_path):
 
 def test_a_reload_that_remaps_turn_into_a_loop_is_refused_and_the_running_file_kept():
     running = load_text(GOOD)
-    with Relay(running, ros_args=["-r", "/c:=/front/a"]) as relay:
+    with own_relay(running, ros_args=["-r", "/c:=/front/a"]) as relay:
         before = names_of(relay.evaluate())
         with pytest.raises(ConfigError) as raised:
             relay.reload(load_text(GOOD.replace("topic: /b", "topic: /c")))

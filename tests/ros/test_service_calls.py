@@ -10,7 +10,7 @@ from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.stage import Stage
 
-Relay = pytest.importorskip("syncrelay.ros.relay", reason="rclpy is not installed").Relay
+own_relay = pytest.importorskip("tests.ros.in_process", reason="rclpy is not installed").own_relay
 
 pytestmark = pytest.mark.ros
 
@@ -39,7 +39,7 @@ def test_what_fails_and_what_never_ends_is_answered_and_more_calls_than_can_wait
         return told
 
     caller = stage.caller()
-    with Relay(load_text(_FILE)) as relay:
+    with own_relay(load_text(_FILE)) as relay:
         relay.offer({"never": never, "broken": broken, "hostile": hostile})
         success, why = caller.call("broken")
         assert (success, "ZeroDivisionError('x')" in why) == (False, True)

@@ -21,7 +21,7 @@ _FRONT = {f"/front{topic}": VECTOR for topic in _PAIR}
 _REAR = {f"/rear{topic}": VECTOR for topic in _PAIR}
 
 # A busy machine finds one node long after the other: a type that is to be contested must not be taken before.
-_SETTLES_SLOWLY = "import syncrelay.ros.types as types\ntypes._SETTLE_S = 5.0\n"
+_SETTLES_SLOWLY = "import syncrelay.relay.types as types\ntypes._SETTLE_S = 5.0\n"
 
 
 def _exact(*topics: str, **keys: Any) -> dict[str, Any]:

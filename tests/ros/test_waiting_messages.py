@@ -13,7 +13,7 @@ from tests.ros.processes import DEADLINE_S, wait_until
 from tests.ros.stage import Stage
 from tests.ros.streams import at, merged
 
-Relay = pytest.importorskip("syncrelay.ros.relay", reason="rclpy is not installed").Relay
+own_relay = pytest.importorskip("tests.ros.in_process", reason="rclpy is not installed").own_relay
 
 pytestmark = pytest.mark.ros
 
@@ -37,7 +37,7 @@ def test_only_groups_whose_messages_waited_are_told_that_the_relay_is_too_slow(s
             may_turn.wait(DEADLINE_S)
 
     player = stage.player(_FRONT | _REAR)
-    with Relay(load_text(_FILE), on_turn=turn) as relay:
+    with own_relay(load_text(_FILE), on_turn=turn) as relay:
 
         def sets_of(*counts: int) -> bool:
             relay.step(0)
@@ -49,7 +49,8 @@ def test_only_groups_whose_messages_waited_are_told_that_the_relay_is_too_slow(s
                 for report in relay.evaluate()
             }
 
-        wait_until(lambda: relay.step(0) or all(map(relay.node.count_subscribers, _FRONT | _REAR)), "the subscriptions")
+        subscribed = relay.node.graph.subscribers_of
+        wait_until(lambda: relay.step(0) or all(map(subscribed, _FRONT | _REAR)), "the subscriptions")
         player.match()
         player.play(merged(at("/a", 0), at("/b", 0), at("/c", 0), at("/d", 0)))
         wait_until(lambda: sets_of(1, 1), "a set of both groups")

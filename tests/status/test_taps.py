@@ -13,6 +13,7 @@ from syncrelay.config import load_text
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.explain import RecentDrop, Tape
 from syncrelay.explain.tape import KEPT, UNHEARD_S
+from syncrelay.runtime import SystemRuntime
 from syncrelay.status import Taps
 from syncrelay.status.taps import MOST_TAPS, TapRefusedError
 from syncrelay.sync import DropReason
@@ -22,6 +23,9 @@ from tests.status.support.states import BEGAN, MS, TEXT, relay, working
 
 (GROUP,) = load_text(TEXT).groups
 DROP = RecentDrop(1, BEGAN, DropReason.LATE)
+# One that uses no processor, of which taps have only a share.
+UNLIMITED = SystemRuntime()
+UNLIMITED.thread_time_ns = lambda: 0
 
 
 class Reader:
@@ -48,8 +52,7 @@ class Reader:
 
 @pytest.fixture
 def taps() -> Taps:
-    """Taps without a limit on their share of the processor."""
-    return Taps(Tape(), lambda topic: f"/robot{topic}", processor_s=lambda: 0.0)
+    return Taps(Tape(), lambda topic: f"/robot{topic}", runtime=UNLIMITED)
 
 
 def note(taps: Taps, count: int, *, begin: int = 0) -> None:
@@ -153,8 +156,9 @@ def test_a_tap_that_was_away_for_long_is_told_that_nobody_counted(taps):
 
 
 def test_what_leaves_is_noted_no_more_once_nobody_asks():
-    seconds = [0.0]
-    taps = Taps(Tape(now_s=lambda: seconds[0]), str)
+    runtime, seconds = SystemRuntime(), [0.0]
+    runtime.monotonic = lambda: seconds[0]
+    taps = Taps(Tape(runtime=runtime), str)
     Reader(taps)
     seconds[0] = UNHEARD_S
     note(taps, 1024)
@@ -171,8 +175,9 @@ def test_a_number_of_another_run_is_no_number_of_this_one(taps):
 
 
 def test_taps_that_take_too_much_of_the_processor_are_given_nothing_for_a_while():
-    taken = itertools.count(step=60)
-    taps = Taps(Tape(), str, processor_s=lambda: next(taken))
+    runtime, taken = SystemRuntime(), itertools.count(step=60 * 1000 * MS)
+    runtime.thread_time_ns = lambda: next(taken)
+    taps = Taps(Tape(), str, runtime=runtime)
     reader, other = Reader(taps), Reader(taps, "b")
     note(taps, 2)
     assert len(reader.read()) == 2
@@ -212,7 +217,7 @@ def test_a_query_that_makes_no_sense_is_a_bad_request(query, text):
 
 
 def test_a_tap_is_answered_over_http():
-    taps = Taps(Tape(), str, processor_s=lambda: 0.0)
+    taps = Taps(Tape(), str, runtime=UNLIMITED)
     with serving(relay(working()), taps=taps) as address:
         assert asked(address, "/tap?tap=a")[0] == 200
         note(taps, 2)
@@ -226,7 +231,7 @@ def test_a_tap_is_answered_over_http():
 
 
 def test_fifty_taps_that_stall_keep_nobody_from_an_answer_and_hold_back_no_set():
-    taps = Taps(Tape(), str, processor_s=lambda: 0.0)
+    taps = Taps(Tape(), str, runtime=UNLIMITED)
     with serving(relay(working()), taps=taps) as address, ExitStack() as stack:
         reader = Reader(taps)
         for number in range(50):

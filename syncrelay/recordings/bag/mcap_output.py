@@ -9,8 +9,9 @@ from typing import Any, BinaryIO, Final, Self
 import yaml
 from mcap.writer import Writer
 
+from syncrelay.config.profile import Profile
 from syncrelay.output_files import cannot_be_written, local_path, require_new, written_whole
-from syncrelay.recordings.bag.qos import Profile, write_profile
+from syncrelay.recordings.bag.qos import write_profile
 from syncrelay.recordings.bag.recording import Definition, Encoding
 
 MCAP_SUFFIX: Final = ".mcap"

@@ -1,19 +1,15 @@
-"""QoS profiles in recordings: read, combined with what a file asks for, and written as rosbag2 does (version 9)."""
+"""QoS profiles in recordings: read, and written as rosbag2 does (version 9)."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict
 from typing import Any, Final
 
 import yaml
 
-from syncrelay.config import QosOverrides, QosPreset
+from syncrelay.config.profile import UNSET, Profile
 from syncrelay.config.yaml_tree import LOADER
 
-# rclpy's default for every duration, which rosbag2 writes too: 0 means no limit.
-_UNSET: Final = 0
 _NS_PER_SECOND: Final = 1_000_000_000
-# The depth of the relay's subscriptions (syncrelay.ros.qos).
-_DEPTH: Final = 100
 # Older files have the numbers of rmw/types.h instead of names.
 _NAMES: Final[Mapping[str, Sequence[str]]] = {
     "history": ("system_default", "keep_last", "keep_all", "unknown"),
@@ -25,56 +21,6 @@ _NAMES: Final[Mapping[str, Sequence[str]]] = {
 _DEEPEST: Final = 5
 _LONGEST: Final = 100_000
 _DURATIONS: Final = ("deadline", "lifespan", "liveliness_lease_duration")
-
-
-@dataclass(frozen=True, slots=True)
-class Profile:
-    """A QoS profile by rosbag2's keys; durations in nanoseconds, 0 where there is no limit."""
-
-    history: str = "keep_last"
-    depth: int = 10
-    reliability: str = "reliable"
-    durability: str = "volatile"
-    deadline: int = _UNSET
-    lifespan: int = _UNSET
-    liveliness: str = "system_default"
-    liveliness_lease_duration: int = _UNSET
-    avoid_ros_namespace_conventions: bool = False
-
-
-_BEST_AVAILABLE_NS: Final = 9_223_372_036_854_775_806
-# rclpy's presets (rclpy.qos.QoSPresetProfiles).
-PRESETS: Final[Mapping[str, Profile]] = {
-    "system_default": Profile("system_default", 0, "system_default", "system_default"),
-    "default": Profile(),
-    "sensor_data": Profile(depth=5, reliability="best_effort"),
-    "services_default": Profile(),
-    "parameters": Profile(depth=1000),
-    "parameter_events": Profile(depth=1000),
-    "action_status_default": Profile(depth=1, durability="transient_local"),
-    "best_available": Profile(
-        reliability="best_available",
-        durability="best_available",
-        deadline=_BEST_AVAILABLE_NS,
-        liveliness="best_available",
-        liveliness_lease_duration=_BEST_AVAILABLE_NS,
-    ),
-}
-"""The presets that a file can name."""
-
-
-def output_profile(asked: QosPreset | QosOverrides, offered: Sequence[Profile]) -> Profile:
-    """Return the profile of the relay's output: what the file asks for, and what all publishers can serve."""
-    if isinstance(asked, QosPreset):
-        return PRESETS[asked.name]
-    served = Profile(
-        depth=_DEPTH,
-        reliability="reliable" if all(each.reliability != "best_effort" for each in offered) else "best_effort",
-        durability="transient_local"
-        if offered and all(each.durability == "transient_local" for each in offered)
-        else "volatile",
-    )
-    return replace(served, **asked.model_dump(exclude_none=True))
 
 
 def read_profiles(recorded: str) -> tuple[Profile, ...]:
@@ -136,4 +82,4 @@ def _nanoseconds(value: Any) -> int:
     try:
         return int(value["sec"]) * _NS_PER_SECOND + int(value["nsec"])
     except (KeyError, TypeError, ValueError, OverflowError):
-        return _UNSET
+        return UNSET

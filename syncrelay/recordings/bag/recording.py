@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Protocol, TypeAlias
 
+from syncrelay.config.profile import Profile
 from syncrelay.printable import printable
-from syncrelay.recordings.bag.qos import Profile
 
 # Renamed in ROS 2, with the same fields.
 _RENAMED: Final = {"tf/msg/tfMessage": "tf2_msgs/msg/TFMessage"}

@@ -9,10 +9,10 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag1
 from rosbags.rosbag1 import Reader, ReaderError
 from rosbags.rosbag1.reader import IndexData, decompressors
 
+from syncrelay.config.profile import Profile
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag.effort import Effort
 from syncrelay.recordings.bag.losses import Losses
-from syncrelay.recordings.bag.qos import Profile
 from syncrelay.recordings.bag.recording import Channel, Definition, Encoding, RawMessage, batched
 from syncrelay.recordings.bag.unpacking import unbz2, unlz4
 

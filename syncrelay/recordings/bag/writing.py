@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 from syncrelay.cdr import patch_stamp
 from syncrelay.config.names_in_graph import MANIFEST_TYPE, manifest_topic
+from syncrelay.config.profile import Profile, matched
 from syncrelay.dataflow.manifest import MANIFEST_DEPTH, ManifestWriter, Note
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag.bindings import GroupBinding, Input
 from syncrelay.recordings.bag.definitions import as_ros2, begins_with_header, converter, jazzy_definition
 from syncrelay.recordings.bag.mcap_output import McapOutput, Output
-from syncrelay.recordings.bag.qos import Profile, output_profile
 from syncrelay.recordings.bag.recording import Channel, Encoding
 from syncrelay.sync import Match, Message, Outcome
 
@@ -87,7 +87,7 @@ class SetWriter:
     def _add(self, each: Input) -> None:
         first = each.channels[0]
         offered = [profile for channel in each.channels for profile in channel.qos]
-        profile = output_profile(each.config.qos, offered)
+        profile = matched(each.config.qos, offered)
         self._outputs[each.output] = self._recording.add(each.output, first.type, *as_ros2(first), profile)
         for channel in each.channels:
             self._payloads[each.output, channel] = outgoing(each, channel)

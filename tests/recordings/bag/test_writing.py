@@ -9,9 +9,10 @@ from rosbags.interfaces import ConnectionExtRosbag2, QosDurability, QosReliabili
 from rosbags.rosbag2 import Reader
 
 from syncrelay.config import AUTO, QosOverrides, QosPreset
+from syncrelay.config.profile import PRESETS, Profile, matched
 from syncrelay.errors import OutputError
 from syncrelay.recordings.bag.mcap_output import McapOutput
-from syncrelay.recordings.bag.qos import PRESETS, Profile, output_profile, read_profiles, write_profile
+from syncrelay.recordings.bag.qos import read_profiles, write_profile
 from syncrelay.recordings.bag.replay import replay
 from syncrelay.recordings.bag.writing import SetWriter
 from tests.recordings.bag.making import (
@@ -175,7 +176,7 @@ def test_nothing_is_overwritten(tmp_path):
     ],
 )
 def test_outputs_offer_what_the_relay_would(asked, offered, profile):
-    assert output_profile(asked, offered) == profile
+    assert matched(asked, offered) == profile
 
 
 def test_profiles_are_read_from_every_version_of_the_metadata():

@@ -1,15 +1,15 @@
 """What the graph shows around the inputs of groups: who publishes them, who takes their outputs, what was meant."""
 
-import time
-from collections.abc import Hashable, Iterable
-from typing import Any, NamedTuple
+from collections.abc import Hashable, Iterable, Sequence
+from typing import NamedTuple
 
 from syncrelay.config.wording import counted
 from syncrelay.dataflow.observers import Losses
 from syncrelay.explain import Endpoint, GraphSnapshot, InputGraph, Refusal
-from syncrelay.ros import graph
-from syncrelay.ros.entities import Purpose
-from syncrelay.ros.inputs import InputBinding
+from syncrelay.relay import graph
+from syncrelay.relay.inputs import InputBinding
+from syncrelay.relay.ports import EndpointInfo, Node, Purpose
+from syncrelay.runtime import Runtime
 
 
 class _Around(NamedTuple):
@@ -24,10 +24,10 @@ class _Around(NamedTuple):
 class Surroundings:
     """Keeps what the graph shows around each input until the graph changes. On the main thread."""
 
-    def __init__(self, node: Any, purpose: Purpose, *, relay_name: str) -> None:
-        """Poll the graph through a node; `relay_name` is the relay's full name, another one if this node observes."""
+    def __init__(self, node: Node, purpose: Purpose, *, runtime: Runtime) -> None:
         self._node = node
-        self._relay_name = relay_name
+        self._graph = node.graph
+        self._runtime = runtime
         self._publishes = purpose is Purpose.RELAY
         self._bindings: frozenset[InputBinding] = frozenset()
         self._around: dict[InputBinding, _Around] = {}
@@ -52,7 +52,7 @@ class Surroundings:
 
     def nodes_and_topics(self) -> Hashable:
         """Return the nodes and topics that have been found."""
-        return graph.other_nodes(self._node), frozenset(graph.topics_in(self._node))
+        return graph.other_nodes(self._node), frozenset(graph.topics_in(self._graph))
 
     def of(self, binding: InputBinding, losses: Losses) -> InputGraph:
         """Return what there is around an input, of whose messages DDS lost some."""
@@ -78,19 +78,18 @@ class Surroundings:
         )
 
     def _poll(self, binding: InputBinding) -> _Around:
-        node, topic = self._node, binding.topic
-        output = node.resolve_topic_name(binding.output.topic)
-        publishers = node.get_publishers_info_by_topic(output)
+        topic, output = binding.topic, self._node.resolve_topic(binding.output.topic)
+        publishers = self._graph.publishers_of(output)
         # A node that only observes does not count the relay itself as a rival.
         own = int(binding.output.publisher is not None) if self._publishes else len(publishers)
-        rivals = graph.others(publishers, than=self._relay_name, own=own)
+        rivals = graph.others(publishers, than=self._node.relay_name, own=own)
         if rivals:
-            self._rivals_since.setdefault(binding, time.time_ns())
+            self._rivals_since.setdefault(binding, self._runtime.time_ns())
         else:
             self._rivals_since.pop(binding, None)
         return _Around(
             output=output,
-            subscribers=graph.subscribers(node.get_subscriptions_info_by_topic(output), topic.profile)
+            subscribers=graph.as_subscribers(self._graph.subscribers_of(output), topic.profile)
             if topic.profile is not None
             else (),
             rivals=rivals,
@@ -99,15 +98,16 @@ class Surroundings:
 
     def _alike(self, name: str, type_name: str | None) -> tuple[str, ...]:
         """Return topics that may have been meant; outputs of relays are none."""
-        outputs = {self._node.resolve_topic_name(binding.output.topic) for binding in self._bindings}
-        published = graph.published_topics(self._node).items()
-        of_type = [each for each in published if type_name in (None, *each[1]) and each[0] not in outputs]
-        return graph.topics_alike(name, type_name, [each for each in of_type if not self._is_relayed(each[0])])
+        outputs = {self._node.resolve_topic(binding.output.topic) for binding in self._bindings}
+        published = graph.published_topics(self._graph)
+        types = {topic: tuple({each.type for each in publishers}) for topic, publishers in published.items()}
+        of_type = [topic for topic, of in types.items() if type_name in (None, *of) and topic not in outputs]
+        not_relayed = [topic for topic in of_type if not self._is_relayed(topic, published[topic])]
+        return graph.topics_alike(name, type_name, [(topic, types[topic]) for topic in not_relayed])
 
-    def _is_relayed(self, name: str) -> bool:
+    def _is_relayed(self, name: str, publishers: Sequence[EndpointInfo]) -> bool:
         if name not in self._relayed:
-            publishers = self._node.get_publishers_info_by_topic(name)
-            self._relayed[name] = any(graph.is_relayed(self._node, each, name) for each in publishers)
+            self._relayed[name] = any(graph.is_relayed(self._graph, each, name) for each in publishers)
         return self._relayed[name]
 
 

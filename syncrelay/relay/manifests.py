@@ -1,41 +1,46 @@
 """The publishers of manifests, one a group, which outlive the group where a reload puts another in its place."""
 
 import logging
-import time
 from collections.abc import Iterable
-from typing import Any, Final
+from typing import Final
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.duration import Duration
-from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSProfile, QoSReliabilityPolicy
 
 from syncrelay.config.names_in_graph import manifest_topic
+from syncrelay.config.profile import Profile
 from syncrelay.dataflow.backend import Outlet, RclBackend
 from syncrelay.dataflow.bugs import Bugs, OnceLog
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.manifest import MANIFEST_DEPTH, ManifestWriter
 from syncrelay.dataflow.manifest_queue import GroupManifests, ManifestQueue
 from syncrelay.dataflow.receive import ReceiveLoop
-from syncrelay.ros.entities import Entities, Purpose, RefusedError
+from syncrelay.relay.entities import Entities, RefusedError
+from syncrelay.relay.ports import Node, Publisher, Purpose
+from syncrelay.runtime import Runtime
 
-_PROFILE: Final = QoSProfile(
-    history=QoSHistoryPolicy.KEEP_LAST,
-    depth=MANIFEST_DEPTH,
-    reliability=QoSReliabilityPolicy.RELIABLE,
-    durability=QoSDurabilityPolicy.VOLATILE,
-)
+_PROFILE: Final = Profile(depth=MANIFEST_DEPTH)
 
 
 class Manifests:
     """Has the manifests of groups' sets published, on the thread that runs `queue`. On the main thread."""
 
-    def __init__(self, *, entities: Entities, node: Any, backend: RclBackend, loop: ReceiveLoop, bugs: Bugs) -> None:
-        self.queue = ManifestQueue(bugs=bugs)
+    def __init__(
+        self,
+        *,
+        entities: Entities,
+        node: Node,
+        backend: RclBackend,
+        loop: ReceiveLoop,
+        bugs: Bugs,
+        runtime: Runtime,
+    ) -> None:
+        self.queue = ManifestQueue(bugs=bugs, runtime=runtime)
+        self._runtime = runtime
         self._entities = entities
         self._node = node
         self._backend = backend
         self._loop = loop
-        self._publishers: dict[str, tuple[Any, Outlet]] = {}
+        self._publishers: dict[str, tuple[Publisher, Outlet]] = {}
         self._begun: dict[GroupRelay, GroupManifests] = {}
         self._once = OnceLog()
 
@@ -61,7 +66,7 @@ class Manifests:
         for name in [name for name in self._publishers if name not in wanted]:
             self._entities.end(self._publishers.pop(name)[0])
 
-    def publishers_of(self, group: GroupRelay) -> list[Any]:
+    def publishers_of(self, group: GroupRelay) -> list[Publisher]:
         """Return the publisher of a group's manifests, if it has one."""
         held = self._publishers.get(group.config.name)
         return [held[0]] if held and self._is_wanted(group) else []
@@ -70,7 +75,7 @@ class Manifests:
         """Publish what was noted; give subscribers until `deadline`, by time.monotonic_ns(), to get it."""
         self.queue.publish()
         for publisher, _ in self._publishers.values():
-            publisher.wait_for_all_acked(Duration(nanoseconds=max(0, deadline - time.monotonic_ns())))
+            publisher.wait_until_acknowledged(max(0, deadline - self._runtime.monotonic_ns()))
 
     def _is_wanted(self, group: GroupRelay) -> bool:
         return group.config.options.manifest and self._entities.purpose is Purpose.RELAY
@@ -82,8 +87,8 @@ class Manifests:
         return self._publishers[name][1]
 
     def _connect(self, group: GroupRelay, outlet: Outlet) -> None:
-        resolve = self._node.resolve_topic_name
+        resolve = self._node.resolve_topic
         topics = [(resolve(each.topic), resolve(each.output)) for each in group.config.topics]
-        writer = ManifestWriter(group.config, node=self._node.get_fully_qualified_name(), topics=topics)
+        writer = ManifestWriter(group.config, node=self._node.name, topics=topics)
         begun = self._begun[group] = self.queue.begin(group.config.name, writer, outlet)
         self._loop.call(lambda: group.tell_sets(begun))

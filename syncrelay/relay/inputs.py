@@ -2,32 +2,31 @@
 
 import importlib
 import logging
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
-
 from syncrelay.config import TopicConfig
+from syncrelay.config.profile import Profile, is_known, matched
 from syncrelay.dataflow.backend import RclBackend, RclCallError, Source
 from syncrelay.dataflow.bugs import OnceLog
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import TypeImportError
 from syncrelay.explain import Endpoint, Refusal
-from syncrelay.ros import graph
-from syncrelay.ros.entities import Entities, RefusedError
-from syncrelay.ros.outputs import Output, Outputs, handler
-from syncrelay.ros.qos import input_profile
-from syncrelay.ros.types import SettlingType, import_type, name_of
+from syncrelay.relay.entities import Entities, RefusedError
+from syncrelay.relay.graph import as_publishers
+from syncrelay.relay.outputs import Output, Outputs, handler
+from syncrelay.relay.ports import EndpointInfo, Entity, Graph, Publisher, RclError, Subscription
+from syncrelay.relay.types import SettlingType, import_type, name_of
+from syncrelay.runtime import Runtime
 
 _LOG = logging.getLogger("syncrelay")
 
 # Requests that DDS refused are repeated this often, and at once after a reload, which may have freed a topic.
 _TRY_AGAIN_S: Final = 5.0
-# Errors of rcl and of the kernel; all others are bugs of ours.
-_OF_RCL: Final = (_rclpy.RCLError, RclCallError, OSError)
+# Errors of ROS and of the kernel; all others are bugs of ours.
+_OF_ROS: Final = (RclError, RclCallError, OSError)
 
 
 class TopicInput:
@@ -37,7 +36,15 @@ class TopicInput:
     """
 
     def __init__(
-        self, config: TopicConfig, *, name: str, entities: Entities, node: Any, backend: RclBackend, loop: ReceiveLoop
+        self,
+        config: TopicConfig,
+        *,
+        name: str,
+        entities: Entities,
+        graph: Graph,
+        backend: RclBackend,
+        loop: ReceiveLoop,
+        runtime: Runtime,
     ) -> None:
         self.name = name
         self.type = config.type
@@ -46,22 +53,22 @@ class TopicInput:
         self.type_from: Endpoint | None = None
         """The publisher whose type was taken because the file has none; that type stays."""
         self.missing: str | None = self._publisher_words
-        self.outputs = Outputs(entities=entities, backend=backend)
+        self.outputs = Outputs(entities=entities, backend=backend, runtime=runtime)
         self.refusal: Refusal | None = None
         """Why DDS does not make the subscription."""
-        self.profile: Any = None
+        self.profile: Profile | None = None
         """The QoS of the subscription and of the outputs; None until it is known."""
-        self.entity: Any = None
+        self.entity: Subscription | None = None
         """The subscription; None while there is none, as when all groups that use it sleep."""
         self._topic = config.topic
         self._qos = config.qos
         self._entities = entities
-        self._node = node
+        self._graph = graph
         self._backend = backend
         self._loop = loop
+        self._runtime = runtime
         self._message_type: Any = None
         self._settling = SettlingType()
-        self._lost: Any = None
         self._failure: Exception | None = None
         self._is_held = False
         self._force_poll = True
@@ -91,7 +98,7 @@ class TopicInput:
 
     @property
     def _may_try(self) -> bool:
-        return time.monotonic() >= self._try_again
+        return self._runtime.monotonic() >= self._try_again
 
     @property
     def _publisher_words(self) -> str:
@@ -128,7 +135,7 @@ class TopicInput:
         source, self.outputs.source = self.outputs.source, None
         if source is not None:
             self._loop.call(lambda: self._loop.remove(source)).result()
-        self.profile = self._lost = None
+        self.profile = None
         if self.entity is not None:
             self._entities.end(self.entity)
             self.entity = None
@@ -148,8 +155,8 @@ class TopicInput:
         self._force_poll = True
         if self._failure is not None:
             self._end_failed(self._failure)
-        endpoints = self._node.get_publishers_info_by_topic(self.name)
-        self.publishers = graph.publishers(endpoints, self.profile)
+        endpoints = self._graph.publishers_of(self.name)
+        self.publishers = as_publishers(endpoints, self.profile)
         self.missing = self._find_type() or self._find_publishers(endpoints)
         self._force_poll = False
 
@@ -157,7 +164,7 @@ class TopicInput:
         self._failure = None
         self.close()
         self._refused(self._refusal(str(error) or type(error).__name__))
-        if not isinstance(error, _OF_RCL):
+        if not isinstance(error, _OF_ROS):
             raise error
 
     def _find_type(self) -> str | None:
@@ -178,7 +185,9 @@ class TopicInput:
     def _import_type(self) -> str | None:
         """Import the file's type, or the one that the topic's publishers have; return what is missing."""
         self.not_importable = None
-        publisher = self._settling.publisher(self.publishers, now=time.monotonic()) if self.type is None else None
+        publisher = (
+            self._settling.publisher(self.publishers, now=self._runtime.monotonic()) if self.type is None else None
+        )
         type_name = publisher.type if publisher is not None else self.type
         if type_name is None:
             return f"the type of {self.name}" if self.publishers else self._publisher_words
@@ -193,12 +202,11 @@ class TopicInput:
             _LOG.info("%s: %s, as %s publishes it", self.name, type_name, publisher.node)
         return None
 
-    def _find_publishers(self, endpoints: Sequence[Any]) -> str | None:
-        fitting = [endpoint for endpoint in endpoints if endpoint.topic_type == self.type]
-        profile = input_profile(self._qos, [endpoint.qos_profile for endpoint in fitting])
-        if profile is not None and not self._is_held and (self._may_try or not self._is_refused):
-            self._follow(profile)
-        self.publishers = graph.publishers(endpoints, self.profile)
+    def _find_publishers(self, endpoints: Sequence[EndpointInfo]) -> str | None:
+        offered = [endpoint.profile for endpoint in endpoints if endpoint.type == self.type]
+        if is_known(self._qos, offered) and not self._is_held and (self._may_try or not self._is_refused):
+            self._follow(matched(self._qos, offered))
+        self.publishers = as_publishers(endpoints, self.profile)
         expected = f"the relay took {self.type}" if self.type_from else f"the file says {self.type}"
         for stranger in self.publishers:
             if stranger.type != self.type:
@@ -222,9 +230,9 @@ class TopicInput:
 
     def lost(self) -> int:
         """How many messages DDS lost on the way here since the subscription was made."""
-        return int(self._lost.take_event().total_count) if self._lost is not None else 0
+        return self.entity.lost() if self.entity is not None else 0
 
-    def _follow(self, profile: Any) -> None:
+    def _follow(self, profile: Profile) -> None:
         """Have a subscription of this QoS, if one is wanted, and all publishers, as far as DDS makes them."""
         try:
             if profile != self.profile or self._is_wanted is (self.entity is None):
@@ -247,43 +255,41 @@ class TopicInput:
         self._put_off(refusal)
 
     def _put_off(self, refusal: Refusal) -> None:
-        self._try_again = time.monotonic() + _TRY_AGAIN_S
+        self._try_again = self._runtime.monotonic() + _TRY_AGAIN_S
         self._once.log(logging.ERROR, refusal.text)
 
-    def _exchange(self, profile: Any) -> None:
+    def _exchange(self, profile: Profile) -> None:
         """Replace the subscription, by none if none is wanted; of another QoS, the outputs too.
 
         Raises RefusedError, with nothing changed. An output that DDS does not make again stays as it was.
         """
-        is_wanted, publishers, refused = self._is_wanted, dict[Output, Any](), list[Refusal]()
+        is_wanted, publishers, refused = self._is_wanted, dict[Output, Publisher](), list[Refusal]()
         subscription = self._entities.subscription(self._message_type, self._topic, profile) if is_wanted else None
         if profile != self.profile:
             publishers, refused = self.outputs.remake(self._message_type, profile)
         for refusal in refused:
             self._put_off(refusal)
-        lost = source = None
+        source = None
         try:
             if subscription is not None:
-                lost = _loss_counter(subscription)
                 source = self._backend.source(subscription, self.outputs.deliver)
             old = self._loop.call(lambda: self._swap(source, publishers)).result()
         except BaseException as error:
-            # The counter would keep the subscription alive.
-            lost = None
-            for entity in filter(None, (*publishers.values(), subscription)):
-                self._entities.end(entity)
-            if isinstance(error, _OF_RCL):
+            self._end(*publishers.values(), subscription)
+            if isinstance(error, _OF_ROS):
                 raise RefusedError(self._refusal(str(error))) from error
             raise
         if self.entity is not None and subscription is not None:
             _LOG.info("%s: subscribed again, because the QoS of its publishers changed", self.name)
-        old.append(self.entity)
-        self.profile, self._lost, self.entity = profile, lost, subscription
-        for entity in old:
+        before, self.profile, self.entity = self.entity, profile, subscription
+        self._end(*old, before)
+
+    def _end(self, *entities: Entity | None) -> None:
+        for entity in entities:
             if entity is not None:
                 self._entities.end(entity)
 
-    def _swap(self, source: Source | None, publishers: Mapping[Output, Any]) -> list[Any]:
+    def _swap(self, source: Source | None, publishers: Mapping[Output, Publisher]) -> list[Publisher | None]:
         """Receive from another source, or none, publish by others; the publishers that end. On the loop's thread."""
         # This may fail, so it comes first.
         if source is not None:
@@ -319,13 +325,3 @@ class InputBinding:
         if self.output.not_readable:
             return f"the field of {self.topic.name} that the file names"
         return f"DDS to let it {self.refusal.verb} {self.refusal.topic}" if self.refusal else None
-
-
-def _loss_counter(subscription: Any) -> Any:
-    """Return what counts the messages that DDS loses, None where DDS does not count them. Raises RCLError."""
-    try:
-        return _rclpy.EventHandle(
-            subscription.handle, _rclpy.rcl_subscription_event_type_t.RCL_SUBSCRIPTION_MESSAGE_LOST
-        )
-    except _rclpy.UnsupportedEventTypeError:
-        return None

@@ -1,46 +1,34 @@
-"""The relay: a ROS node and its threads, and what its main thread does turn by turn."""
+"""The relay: a node and its threads, and what its main thread does turn by turn."""
 
 import logging
-import os
-import time
 from collections.abc import Callable, Collection, Sequence
-from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
-from contextlib import suppress
-from functools import cache
+from concurrent.futures import CancelledError, Future
 from types import TracebackType
-from typing import Any, Self, TypeVar
-
-import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.task import Future as RosFuture
+from typing import Self, TypeVar
 
 from syncrelay import own_version
 from syncrelay.collector import resting_collector
 from syncrelay.config import Config
+from syncrelay.dataflow.backend import RclBackend
 from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.calls import Calls
 from syncrelay.dataflow.receive import ReceiveLoop
-from syncrelay.environment.transport import apply_transport
 from syncrelay.errors import ReloadError, SyncRelayError
 from syncrelay.explain import GroupReport, Tape
 from syncrelay.logs import name_after
-from syncrelay.ros.backend_choice import VARIABLE, choose_backend
-from syncrelay.ros.bindings import GroupBindings
-from syncrelay.ros.clock import WaitingClock
-from syncrelay.ros.diagnostics import Reporters
-from syncrelay.ros.entities import Entities, Purpose
-from syncrelay.ros.groups import Groups, require_distinct_names
-from syncrelay.ros.hidden_node import join_hidden
-from syncrelay.ros.leaving import leave
-from syncrelay.ros.manifests import Manifests
-from syncrelay.ros.monitor import EVALUATE_S, Monitor
-from syncrelay.ros.parameters import Parameters
-from syncrelay.ros.services import Offered, Services
-from syncrelay.ros.start import RosoutHandler, make_node, resolver, start
-from syncrelay.ros.surroundings import Surroundings
+from syncrelay.relay.bindings import GroupBindings
+from syncrelay.relay.clock import WaitingClock
+from syncrelay.relay.diagnostics import Reporters
+from syncrelay.relay.entities import Entities
+from syncrelay.relay.groups import Groups, require_distinct_names
+from syncrelay.relay.manifests import Manifests
+from syncrelay.relay.monitor import EVALUATE_S, Monitor
+from syncrelay.relay.ports import Node, Outcome, Purpose
+from syncrelay.relay.services import Offered, Services
+from syncrelay.relay.surroundings import Surroundings
+from syncrelay.runtime import SYSTEM, Running, Runtime
 from syncrelay.status import Phase, RelayState, Taps, advice
 from syncrelay.sync import DropReason
-from syncrelay.wakeup import Wakeup
 
 _LOG = logging.getLogger("syncrelay")
 _Result = TypeVar("_Result")
@@ -65,56 +53,43 @@ _ACKNOWLEDGE_NS = 300_000_000
 class Relay:
     """A node that relays the groups of a file; a context manager that runs its receive thread.
 
-    Made on the main thread, whose turns at `step` poll the graph. Data flows on a thread of its own; parameters and
-    the clock are served on a third, and manifests are published on a fourth.
+    Made on the main thread, whose turns at `step` poll the graph. Data flows on a thread of its own; the node is served
+    on a third, and manifests are published on a fourth.
     """
 
     @resting_collector()
     def __init__(
         self,
         config: Config,
+        node: Node,
+        backend: RclBackend,
         *,
         config_paths: Sequence[str] = (),
         groups: Collection[str] | None = None,
-        ros_args: Sequence[str] = (),
         on_turn: Callable[[], None] | None = None,
         purpose: Purpose = Purpose.RELAY,
-        manage: "Callable[[Relay], Callable[..., Any]] | None" = None,
+        manage: "Callable[[Relay], Callable[[str], Outcome]] | None" = None,
+        runtime: Runtime = SYSTEM,
     ) -> None:
-        """Join the ROS graph; `groups` are the names of those to run, None for all of them.
+        """Take a node that has joined the graph, to leave with it; `groups` are those to run, None for all.
 
-        One that only observes is hidden from lists of nodes, and publishes nothing.
+        A relay that only observes publishes nothing.
 
         `config_paths` are the files' names for `state` and a parameter. `on_turn` is called on the receive thread at
         least once a second, for as long as that works. With `manage` the node is a managed one, which starts without
-        groups; it returns what makes that node. Raises ConfigError where remaps give two topics one name, UsageError
-        where ROS rejects `ros_args`.
+        groups; it returns what carries out its transitions. Raises ConfigError where remaps give two topics one name,
+        UsageError where ROS rejects what they make of one.
         """
-        apply_transport(config.node.transport, os.environ)
-        if purpose is Purpose.OBSERVE:
-            self._context, self.node, relay_name = join_hidden(config, ros_args)
-        else:
-            self._context = start(ros_args, simulated=config.node.use_sim_time)
-            self.node = make_node(
-                config.node.name,
-                namespace=config.node.namespace,
-                context=self._context,
-                ros_args=ros_args,
-                make=rclpy.create_node if manage is None else manage(self),
-            )
-            relay_name = self.node.get_fully_qualified_name()
-        # Any thread may ask for a name, also after the node has ended: so all are resolved here.
-        resolve = cache(resolver(self.node, ros_args))
+        self.node = node
+        self._runtime = runtime
         try:
-            require_distinct_names(config, groups, resolve)
+            require_distinct_names(config, groups, node.resolve_topic)
         except SyncRelayError:
-            leave(self.node, self._context)
+            node.leave()
             raise
-        name_after(relay_name.removeprefix("/").replace("/", "."))
-        self._rosout = RosoutHandler(self.node.get_logger().name)
-        _LOG.addHandler(self._rosout)
-        self._clock = WaitingClock(self.node)
-        backend = choose_backend(os.environ.get(VARIABLE), node=self.node, context=self._context)
+        name_after(node.relay_name.removeprefix("/").replace("/", "."))
+        _LOG.addHandler(node.log_handler)
+        self._clock = WaitingClock(node, runtime=runtime)
         self.backend = backend.name
         self._bugs = Bugs()
         self._loop = ReceiveLoop(
@@ -123,64 +98,78 @@ class Relay:
             expire=lambda now: self._groups.expire(now),  # noqa: PLW0108  the groups come after the loop
             on_turn=on_turn,
             contain=lambda error: self._bugs.log("receiving", error),
+            runtime=runtime,
         )
-        self._graph_changes = backend.graph_changes(self.node)
-        entities = Entities(self.node, purpose)
-        bindings = GroupBindings(entities=entities, node=self.node, backend=backend, loop=self._loop)
-        self._reporters = Reporters(self.node, entities)
-        self._parameters = None
-        if purpose is Purpose.RELAY:
-            self._parameters = Parameters(self.node, paths=config_paths, version=own_version())
-        self._surroundings = Surroundings(self.node, purpose, relay_name=relay_name)
+        self._graph_changes = backend.graph_changes(node)
+        entities = Entities(node, purpose)
+        bindings = GroupBindings(entities=entities, node=node, backend=backend, loop=self._loop, runtime=runtime)
+        self._reporters = Reporters(node, entities, now=node.ros_time_ns)
+        self._names_groups = purpose is Purpose.RELAY
+        if self._names_groups:
+            node.declare(config_paths, own_version())
+        self._surroundings = Surroundings(node, purpose, runtime=runtime)
         self.monitor = Monitor(
-            node=self.node,
-            loop=self._loop,
-            surroundings=self._surroundings,
-            simulated=self._clock.is_simulated,
-            bugs=self._bugs,
+            node=node, loop=self._loop, surroundings=self._surroundings, bugs=self._bugs, runtime=runtime
         )
-        manifests = Manifests(entities=entities, node=self.node, backend=backend, loop=self._loop, bugs=self._bugs)
+        manifests = Manifests(
+            entities=entities, node=node, backend=backend, loop=self._loop, bugs=self._bugs, runtime=runtime
+        )
         self._manifest_queue = manifests.queue
-        self.taps = Taps(Tape(), resolve)
+        self.taps = Taps(Tape(runtime=runtime), node.resolve_topic, runtime=runtime)
         """The clients that follow what leaves."""
         self._groups = Groups(
             config,
             chosen=groups,
-            node=self.node,
-            resolve=resolve,
+            node=node,
             bindings=bindings,
             manifests=manifests,
             loop=self._loop,
             clock=self._clock,
+            runtime=runtime,
             flow=backend.flow,
             tape=self.taps.tape,
             changed=lambda config: self._report_on(bindings, config),
         )
         self._is_managed = manage is not None
+        if manage is not None:
+            node.manage(manage(self))
         self._config_paths = config_paths
         self._phase = Phase.STARTING if purpose is Purpose.RELAY else Phase.OBSERVING
         self._asked = -_ASKED_S
-        self._next_evaluation = time.monotonic() + EVALUATE_S
-        self._started = time.monotonic()
-        self._wake = Wakeup()
-        self._calls = Calls(self._wake.set)
-        self._threads = ThreadPoolExecutor(max_workers=3, thread_name_prefix="syncrelay")
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self.node)
-        self._served = RosFuture()
-        self._services = Services(self.node, {}, bugs=self._bugs)
+        self._started = runtime.monotonic()
+        self._next_evaluation = self._started + EVALUATE_S
+        self._wake = runtime.rest()
+        self._calls = Calls(self._wake.set, runtime=runtime)
+        self._threads: list[Running] = []
+        self._serves = True
+        self._services = Services(node, {}, bugs=self._bugs, runtime=runtime)
         self._receiving: Future[None] | None = None
 
     def __enter__(self) -> Self:
-        self._receiving = self._threads.submit(self._loop.run)
+        self._receiving = self._start("receive", self._loop.run)
         self._receiving.add_done_callback(lambda _: self._wake.set())
         if self._is_managed:
             self.forget_groups(Phase.UNCONFIGURED)
             _LOG.info("%s", self._advice)
-        self._threads.submit(self._serve)
-        self._threads.submit(self._manifest_queue.run)
+        self._start("serve", self._serve)
+        self._start("manifests", self._manifest_queue.run)
         self._clock.follow(jumped_back=self._groups.clock_jumped_back, ticked=self._groups.clock_ticked)
         return self
+
+    def _start(self, name: str, target: Callable[[], None]) -> "Future[None]":
+        """Have a thread of its own call a function; how that ended comes in the future."""
+        ended: Future[None] = self._runtime.future()
+
+        def run() -> None:
+            try:
+                target()
+            except BaseException as error:  # noqa: BLE001  it is raised where the result is asked for
+                ended.set_exception(error)
+            else:
+                ended.set_result(None)
+
+        self._threads.append(self._runtime.start(f"syncrelay-{name}", run))
+        return ended
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -199,7 +188,7 @@ class Relay:
 
     def offer(self, services: Offered) -> None:
         """Offer services on the node. Their functions are called on its executor's thread, and must not wait."""
-        self._services = Services(self.node, services, bugs=self._bugs)
+        self._services = Services(self.node, services, bugs=self._bugs, runtime=self._runtime)
 
     def reload(self, config: Config) -> str:
         """Run the groups of a file that was read again, and say what changed.
@@ -210,7 +199,7 @@ class Relay:
             raise ReloadError(str(self._advice))
         changed = self._groups.reload(config)
         # New groups are to be evaluated at once.
-        self._next_evaluation = time.monotonic()
+        self._next_evaluation = self._runtime.monotonic()
         return changed
 
     def pause(self) -> str:
@@ -218,7 +207,7 @@ class Relay:
         if self._groups.is_paused:
             return "paused already"
         self._groups.pause()
-        _LOG.warning("paused: nothing leaves until %s is called", self.node.resolve_service_name("~/resume"))
+        _LOG.warning("paused: nothing leaves until %s is called", self.node.resolve_service("~/resume"))
         self._show_pauses()
         return "paused: nothing leaves until ~/resume is called"
 
@@ -260,16 +249,16 @@ class Relay:
         self._enter(phase)
 
     def _be_inactive(self) -> None:
-        self.monitor.inactive = self.node.get_fully_qualified_name()
+        self.monitor.inactive = self.node.name
         self._enter(Phase.INACTIVE)
 
     @property
     def _advice(self) -> str | None:
-        return advice(self._phase, self.node.get_fully_qualified_name())
+        return advice(self._phase, self.node.name)
 
     def _enter(self, phase: Phase) -> None:
         self._phase = phase
-        self._next_evaluation = time.monotonic()
+        self._next_evaluation = self._runtime.monotonic()
 
     def refuse_reload(self, reason: str) -> None:
         """Report in `state` that a reload failed, and why."""
@@ -279,8 +268,8 @@ class Relay:
         self.monitor.watch(bindings.all)
         names = [group.config.name for group in bindings.groups]
         self._reporters.configure(config, names)
-        if self._parameters is not None:
-            self._parameters.name_groups(names)
+        if self._names_groups:
+            self.node.name_groups(names)
 
     def wake(self) -> None:
         """Have `step` return at once. Safe in a signal handler."""
@@ -303,11 +292,11 @@ class Relay:
         with self._bugs.contained("polling the graph"):
             self._poll_graph()
             self._groups.announce()
-        if (now := time.monotonic()) >= self._next_evaluation:
+        if (now := self._runtime.monotonic()) >= self._next_evaluation:
             with self._bugs.contained("evaluating the groups"):
                 self._evaluate(self.monitor.evaluate if self._is_watched(now) else self.monitor.evaluate_in_turn)
         is_waiting = any(binding.waiting_for for binding in self._groups.bindings.all)
-        until_evaluation = max(0.0, self._next_evaluation - time.monotonic())
+        until_evaluation = max(0.0, self._next_evaluation - self._runtime.monotonic())
         rest_s = min(timeout_s, until_evaluation, _EAGER_POLL_S if is_waiting else _POLL_S)
         self.monitor.standstills.end()
         self._wake.wait(rest_s)
@@ -319,11 +308,11 @@ class Relay:
         It takes a little longer where a group without a set has just got its first messages, or where its publishers
         may not have been found yet.
         """
-        end = time.monotonic() + seconds
+        end = self._runtime.monotonic() + seconds
         latest = end + _LONGER_S
-        while not is_over() and (left := end - time.monotonic()) > 0:
+        while not is_over() and (left := end - self._runtime.monotonic()) > 0:
             self.step(left)
-            if time.monotonic() >= end and any(map(_is_early, self.evaluate())):
+            if self._runtime.monotonic() >= end and any(map(_is_early, self.evaluate())):
                 end = min(end + EVALUATE_S, latest)
         return self.evaluate()
 
@@ -348,7 +337,7 @@ class Relay:
         return self._evaluate(self.monitor.evaluate)
 
     def _evaluate(self, evaluate: Callable[[], None]) -> tuple[GroupReport, ...]:
-        self._next_evaluation = time.monotonic() + EVALUATE_S
+        self._next_evaluation = self._runtime.monotonic() + EVALUATE_S
         try:
             evaluate()
         except CancelledError:
@@ -361,9 +350,9 @@ class Relay:
 
     def state(self) -> RelayState:
         """The state of the relay, as last evaluated. Any thread."""
-        self._asked = now = time.monotonic()
+        self._asked = now = self._runtime.monotonic()
         return RelayState(
-            node=self.node.get_fully_qualified_name(),
+            node=self.node.name,
             config=", ".join(self._config_paths),
             phase=self._phase,
             uptime_s=now - self._started,
@@ -401,24 +390,21 @@ class Relay:
         finally:
             self._clock.close()
             self._manifest_queue.stop()
-            # First let the executor return: if it is shut down just before it waits, nothing is left to wake it.
-            self._served.set_result(None)
-            self._threads.shutdown()
-            self._executor.shutdown()
+            self._serves = False
+            self.node.end_serving()
+            for thread in self._threads:
+                thread.join()
             self._manifest_queue.keep(())
             self._loop.close()
-            _LOG.removeHandler(self._rosout)
-            leave(self.node, self._context)
+            _LOG.removeHandler(self.node.log_handler)
+            self.node.leave()
 
     def _serve(self) -> None:
-        while self._context.ok():
-            with (
-                self._bugs.contained("serving services and the clock"),
-                suppress(ExternalShutdownException),
-            ):
-                self._executor.spin_until_future_complete(self._served)
+        while self._serves:
+            with self._bugs.contained("serving services and the clock"):
+                self.node.serve()
                 return
-            time.sleep(_AFTER_FAILURE_S)
+            self._runtime.sleep(_AFTER_FAILURE_S)
 
 
 def _is_early(report: GroupReport) -> bool:

@@ -1,9 +1,8 @@
 """Which groups run, and on which topics: how others take their place while messages flow."""
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from syncrelay.config import TopicConfig
 from syncrelay.config.names_in_graph import manifest_topic
@@ -14,8 +13,10 @@ from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError
 from syncrelay.explain import Endpoint
-from syncrelay.ros.entities import Entities, Purpose, RefusedError, has_subscriber
-from syncrelay.ros.inputs import InputBinding, TopicInput
+from syncrelay.relay.entities import Entities, RefusedError
+from syncrelay.relay.inputs import InputBinding, TopicInput
+from syncrelay.relay.ports import Node, Publisher, Purpose
+from syncrelay.runtime import Runtime
 from syncrelay.sync import DropReason
 
 # Within this time, a subscriber that is restarted or waits for publishers of another QoS is back.
@@ -41,7 +42,7 @@ class GroupBinding:
         return missing or None
 
     @property
-    def publishers(self) -> list[Any]:
+    def publishers(self) -> list[Publisher]:
         """Those whose subscribers keep a lazy group awake. On the main thread."""
         return [each.output.publisher for each in self.inputs if each.output.publisher is not None]
 
@@ -49,7 +50,9 @@ class GroupBinding:
 class GroupBindings:
     """All groups that run, in the file's order; one input per topic, however many use it and whatever they call it."""
 
-    def __init__(self, *, entities: Entities, node: Any, backend: RclBackend, loop: ReceiveLoop) -> None:
+    def __init__(
+        self, *, entities: Entities, node: Node, backend: RclBackend, loop: ReceiveLoop, runtime: Runtime
+    ) -> None:
         self.all: tuple[GroupBinding, ...] = ()
         self.is_held = False
         """Whether nothing is received nor published."""
@@ -57,6 +60,7 @@ class GroupBindings:
         self._node = node
         self._backend = backend
         self._loop = loop
+        self._runtime = runtime
         self._topics: dict[Subscription, TopicInput] = {}
         # By topic, the publishers whose types held groups had taken: their successors keep these types.
         self._taken: dict[str, Endpoint] = {}
@@ -73,7 +77,7 @@ class GroupBindings:
         """Each topic once."""
         return list(self._topics.values())
 
-    def count_listeners(self, more: Callable[[GroupRelay], Sequence[Any]]) -> None:
+    def count_listeners(self, more: Callable[[GroupRelay], Sequence[Publisher]]) -> None:
         """Wake the lazy groups that have a subscriber, and put to sleep those that have had none for a while.
 
         `more` returns a group's publishers beside its outputs', whose subscribers count too. A relay that only observes
@@ -81,9 +85,9 @@ class GroupBindings:
         """
         if self._entities.purpose is not Purpose.RELAY:
             return
-        now = time.monotonic()
+        now = self._runtime.monotonic()
         lazy = [binding for binding in self.all if binding.group.config.options.lazy]
-        unheard = [each for each in lazy if not any(map(has_subscriber, (*each.publishers, *more(each.group))))]
+        unheard = [each for each in lazy if not any(out.is_heard() for out in (*each.publishers, *more(each.group)))]
         self._unheard_since = {each.group: self._unheard_since.get(each.group, now) for each in unheard}
         for binding in lazy:
             group, since = binding.group, self._unheard_since.get(binding.group)
@@ -157,7 +161,8 @@ class GroupBindings:
         self, ended: Sequence[GroupBinding], unused: Sequence[TopicInput], begun: Sequence[InputBinding]
     ) -> None:
         """Make the publishers of those who begin, and exchange the groups."""
-        ending = {each.output.publisher for each in _inputs_of(ended)} | {topic.entity for topic in unused}
+        ending: set[object] = {each.output.publisher for each in _inputs_of(ended)}
+        ending |= {topic.entity for topic in unused}
         try:
             late = [each for each in begun if not self._has_publisher(each, ending)]
             if late:
@@ -169,7 +174,7 @@ class GroupBindings:
                 raise ReloadError(str(error)) from error
             raise
 
-    def _has_publisher(self, binding: InputBinding, ending: set[Any]) -> bool:
+    def _has_publisher(self, binding: InputBinding, ending: set[object]) -> bool:
         """Make a publisher; return False if it can only be made once these have ended. Raises RefusedError."""
         try:
             binding.topic.make_publisher(binding.output)
@@ -184,7 +189,7 @@ class GroupBindings:
     ) -> None:
         """End what holds the topics of `late`, then make its publishers; if that fails, make the old ones again."""
         ending = _inputs_of(ended)
-        wanted = {self._node.resolve_topic_name(each.output.topic) for each in late}
+        wanted = {self._node.resolve_topic(each.output.topic) for each in late}
         self._loop.call(lambda: _suspend(ended)).result()
         try:
             publishers = [(each, each.output.publisher) for each in ending if each.output.publisher]
@@ -218,14 +223,20 @@ class GroupBindings:
         names = [topic.output for topic in group.config.topics]
         if group.config.options.manifest:
             names.append(manifest_topic(group.config.name))
-        return any(map(self._node.count_subscribers, map(self._node.resolve_topic_name, names)))
+        return any(self._node.graph.subscribers_of(self._node.resolve_topic(name)) for name in names)
 
     def _topic(self, config: TopicConfig, topics: dict[Subscription, TopicInput]) -> TopicInput:
-        name = self._node.resolve_topic_name(config.topic)
+        name = self._node.resolve_topic(config.topic)
         key = Subscription.of(config, topic=name)
         if key not in topics:
             topics[key] = TopicInput(
-                config, name=name, entities=self._entities, node=self._node, backend=self._backend, loop=self._loop
+                config,
+                name=name,
+                entities=self._entities,
+                graph=self._node.graph,
+                backend=self._backend,
+                loop=self._loop,
+                runtime=self._runtime,
             )
             if self.is_held:
                 topics[key].hold()

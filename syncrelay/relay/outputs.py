@@ -1,19 +1,18 @@
 """What one topic feeds: handlers that read stamps and keys for groups, and publishers by which the messages leave."""
 
-import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rclpy.duration import Duration
-
 from syncrelay.cdr import has_place_for_stamp, read_stamp
+from syncrelay.config.profile import Profile, sent
 from syncrelay.dataflow.backend import Deliver, Outlet, Payload, RclBackend, Source
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.errors import TypeImportError
 from syncrelay.explain import Refusal
-from syncrelay.ros.entities import Entities, Purpose, RefusedError
-from syncrelay.ros.qos import output_profile
-from syncrelay.ros.types import begins_with_header, stamp_reader, value_reader
+from syncrelay.relay.entities import Entities, RefusedError
+from syncrelay.relay.ports import Publisher, Purpose
+from syncrelay.relay.types import begins_with_header, stamp_reader, value_reader
+from syncrelay.runtime import Runtime
 
 
 class Output:
@@ -27,10 +26,10 @@ class Output:
         self.handler: Deliver | None = None
         self.not_readable: str | None = None
         """Why the stamp or key that the file names cannot be read from messages of the type."""
-        self.publisher: Any = None
+        self.publisher: Publisher | None = None
         self.refusal: Refusal | None = None
         """Why DDS does not make its publisher. Until it does, nothing is fed: sets would lack the message."""
-        self._outlet: tuple[Any, Outlet] | None = None
+        self._outlet: tuple[Publisher | None, Outlet] | None = None
 
     @property
     def topic(self) -> str:
@@ -54,7 +53,7 @@ class Output:
 class Outputs:
     """Feeds the inputs of groups from one topic. To be used on the main thread, except where noted."""
 
-    def __init__(self, *, entities: Entities, backend: RclBackend) -> None:
+    def __init__(self, *, entities: Entities, backend: RclBackend, runtime: Runtime) -> None:
         self.all: list[Output] = []
         self.source: Source | None = None
         """The source that feeds them, None while there is none."""
@@ -63,6 +62,7 @@ class Outputs:
         self._handlers: list[Deliver] = []
         self._entities = entities
         self._backend = backend
+        self._runtime = runtime
         self._publishes = entities.purpose is Purpose.RELAY
 
     @property
@@ -70,15 +70,15 @@ class Outputs:
         """Whether DDS does not make one of the publishers."""
         return any(output.refusal for output in self.all)
 
-    def make_publisher(self, output: Output, message_type: Any, profile: Any) -> None:
+    def make_publisher(self, output: Output, message_type: Any, profile: Profile) -> None:
         """Make the publisher of one that has none, unless nothing is to be published. Raises RefusedError."""
         if self._publishes and output.publisher is None:
             output.publisher = self._made(output, message_type, profile)
             output.refusal = None
 
-    def remake(self, message_type: Any, profile: Any) -> tuple[dict[Output, Any], list[Refusal]]:
+    def remake(self, message_type: Any, profile: Profile) -> tuple[dict[Output, Publisher], list[Refusal]]:
         """Make publishers of another QoS; return them, and what DDS refused. Refused outputs stay as they were."""
-        made: dict[Output, Any] = {}
+        made: dict[Output, Publisher] = {}
         refused = []
         for output in self.all if self._publishes else ():
             try:
@@ -89,15 +89,14 @@ class Outputs:
                 refused.append(error.refusal)
         return made, refused
 
-    def _made(self, output: Output, message_type: Any, profile: Any) -> Any:
-        return self._entities.publisher(message_type, output.topic, output_profile(profile))
+    def _made(self, output: Output, message_type: Any, profile: Profile) -> Publisher:
+        return self._entities.publisher(message_type, output.topic, sent(profile))
 
     def wait_until_acknowledged(self, deadline: int) -> None:
         """Give reliable subscribers until `deadline`, by time.monotonic_ns(), to get what was published last."""
         for output in self.all:
             if output.publisher is not None:
-                left = max(0, deadline - time.monotonic_ns())
-                output.publisher.wait_for_all_acked(Duration(nanoseconds=left))
+                output.publisher.wait_until_acknowledged(max(0, deadline - self._runtime.monotonic_ns()))
 
     # These run on the loop's thread, or before that runs.
 
@@ -111,7 +110,7 @@ class Outputs:
         self.all = [output for output in self.all if output.group is not group]
         self.feed()
 
-    def exchange(self, source: Source | None, publishers: Mapping[Output, Any]) -> list[Any]:
+    def exchange(self, source: Source | None, publishers: Mapping[Output, Publisher]) -> list[Publisher | None]:
         """Be fed by another source, publish through these publishers, and return those that they replace."""
         self.source = source
         old = [output.publisher for output in publishers]

@@ -1,12 +1,11 @@
 """Evaluates groups once a second, away from the data: gathers facts, has them judged, logs what is new."""
 
 import logging
-import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from itertools import islice
 from math import ceil
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.group import Batch, GroupRelay
@@ -24,11 +23,13 @@ from syncrelay.explain import (
     Severity,
     TryBudget,
 )
-from syncrelay.ros.bindings import GroupBinding
-from syncrelay.ros.surroundings import Surroundings
+from syncrelay.relay.bindings import GroupBinding
+from syncrelay.relay.ports import Node
+from syncrelay.relay.surroundings import Surroundings
+from syncrelay.runtime import Runtime
 
 if TYPE_CHECKING:
-    from syncrelay.ros.inputs import TopicInput
+    from syncrelay.relay.inputs import TopicInput
 
 _LOG = logging.getLogger("syncrelay")
 _LEVELS: Final = {Severity.OK: logging.INFO, Severity.WARN: logging.WARNING, Severity.ERROR: logging.ERROR}
@@ -50,12 +51,19 @@ class Monitor:
     """Makes a report of each group that it evaluates, and logs what is worth a line. On the main thread."""
 
     def __init__(
-        self, *, node: Any, loop: ReceiveLoop, surroundings: Surroundings, simulated: bool, bugs: Bugs
+        self,
+        *,
+        node: Node,
+        loop: ReceiveLoop,
+        surroundings: Surroundings,
+        bugs: Bugs,
+        runtime: Runtime,
     ) -> None:
         self._node = node
+        self._runtime = runtime
         self._loop = loop
         self._bugs = bugs
-        self._clock = SimulatedClock() if simulated else None
+        self._clock = SimulatedClock(runtime=runtime) if node.is_simulated else None
         self._bindings: Sequence[GroupBinding] = ()
         self._turns: deque[GroupBinding] = deque()
         self._watched: dict[GroupRelay, _Watched] = {}
@@ -63,13 +71,13 @@ class Monitor:
         self._losses: dict[TopicInput, Losses] = {}
         self._surroundings = surroundings
         self._waits: dict[TopicInput, Waits] = {}
-        self.standstills = Standstills()
-        self._discovery = Discovery(now=time.monotonic())
-        self._system_clock = SystemClock()
+        self.standstills = Standstills(runtime=runtime)
+        self._discovery = Discovery(now=runtime.monotonic())
+        self._system_clock = SystemClock(runtime=runtime)
         self._try_budget = TryBudget()
         self._cause_log = CauseLog()
         self._empty_graph: GraphSnapshot | None = None
-        self._ends_pauses = node.resolve_service_name("~/resume")
+        self._ends_pauses = node.resolve_service("~/resume")
         self.inactive: str | None = None
         """The node's name, while it is managed and waits to be activated."""
         self.heard: Callable[[str, Sequence[Arrivals]], object] = lambda _group, _arrivals: None
@@ -88,7 +96,7 @@ class Monitor:
 
     def watch(self, bindings: Sequence[GroupBinding]) -> None:
         """Evaluate these groups from now on; what is known of those that were there before stays."""
-        now = time.time_ns()
+        now = self._runtime.time_ns()
         self._bindings = bindings
         self._turns = deque(bindings)
         self._watched = {
@@ -131,7 +139,7 @@ class Monitor:
         self._log(is_last=True)
 
     def _judge(self, bindings: Sequence[GroupBinding], waits: Sequence[int], batches: Sequence[Batch]) -> None:
-        now = time.time_ns()
+        now = self._runtime.time_ns()
         self._try_budget.refill()
         # Messages are received by the system's clock: a step of it is no wait.
         has_stepped = self._system_clock.has_stepped(now)
@@ -139,13 +147,13 @@ class Monitor:
             recent.observe(0 if has_stepped else waited)
         self.standstills.observe()
         if self._clock is not None:
-            self._clock.observe(self._node.get_clock().now().nanoseconds, now=now)
+            self._clock.observe(self._node.ros_time_ns(), now=now)
         for topic, losses in self._losses.items():
             # A new subscription discovers its publishers anew.
             losses.observe(topic.lost(), publishers=len(topic.publishers) if topic.entity is not None else 0)
         self._empty_graph = self._surroundings.empty_graph()
-        if self._discovery.goes_on(time.monotonic()):
-            self._discovery.observe(self._surroundings.nodes_and_topics(), now=time.monotonic())
+        if self._discovery.goes_on(self._runtime.monotonic()):
+            self._discovery.observe(self._surroundings.nodes_and_topics(), now=self._runtime.monotonic())
         for binding, batch in zip(bindings, batches, strict=True):
             with self._bugs.contained(f"evaluating {binding.group.config.name}"):
                 try:
@@ -180,17 +188,17 @@ class Monitor:
             failure=binding.group.failure,
             pause=None if binding.group.paused_since is None else Pause(binding.group.paused_since, self._ends_pauses),
             asleep=binding.group.sleeps,
-            is_discovering=self._discovery.goes_on(time.monotonic()),
+            is_discovering=self._discovery.goes_on(self._runtime.monotonic()),
             empty_graph=None if all(each.publishers for each in shown) else self._empty_graph,
             inactive=self.inactive,
         )
         found = judge.judge(facts)
         self._reports[binding.group] = GroupReport(facts, found, batch.last)
         remarks = log.remarks(facts, found, judge.explained(facts))
-        self._cause_log.hear(facts, found, remarks, now=time.monotonic_ns())
+        self._cause_log.hear(facts, found, remarks, now=self._runtime.monotonic_ns())
 
     def _log(self, *, is_last: bool = False) -> None:
-        for line in self._cause_log.lines(now=time.monotonic_ns(), is_last=is_last):
+        for line in self._cause_log.lines(now=self._runtime.monotonic_ns(), is_last=is_last):
             about = {
                 "group": line.groups[0] if len(line.groups) == 1 else None,
                 "groups": line.groups if len(line.groups) > 1 else None,

@@ -3,16 +3,18 @@
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Float64
 
 from syncrelay.config import Config
 from syncrelay.config.names_in_graph import DIAGNOSTICS, SCALARS
+from syncrelay.config.profile import Profile
 from syncrelay.dataflow.bugs import OnceLog
 from syncrelay.explain import Distribution, DropFates, GroupReport, InputFacts, explanation
-from syncrelay.ros.entities import Entities, Purpose, RefusedError
+from syncrelay.relay.entities import Entities, RefusedError
+from syncrelay.relay.ports import Node, Publisher, Purpose
 from syncrelay.status import Level, level
 
 _LEVELS: Final = {
@@ -22,14 +24,16 @@ _LEVELS: Final = {
     Level.STALE: DiagnosticStatus.STALE,
 }
 _NS_PER_MS: Final = 1e6
-_NS_PER_SECOND: Final = 1e9
+_NS_PER_SECOND: Final = 1_000_000_000
 
 
 class Reporters:
     """Publishes what the file asks for. A publisher that DDS refuses is tried again at each report."""
 
-    def __init__(self, node: Any, entities: Entities) -> None:
+    def __init__(self, node: Node, entities: Entities, *, now: Callable[[], int]) -> None:
+        """Take the clock that stamps what is published, in nanoseconds."""
         self._node = node
+        self._now = now
         self._entities = entities
         self._wanted: dict[str, Callable[[], Diagnostics | Scalars]] = {}
         self._reporters: dict[str, Diagnostics | Scalars] = {}
@@ -40,7 +44,7 @@ class Reporters:
         asked = config.diagnostics if self._entities.purpose is Purpose.RELAY else None
         self._wanted = {}
         if asked is not None:
-            self._wanted[DIAGNOSTICS] = lambda: Diagnostics(self._node, self._entities)
+            self._wanted[DIAGNOSTICS] = lambda: Diagnostics(self._node, self._entities, now=self._now)
             if asked.scalars:
                 self._wanted |= {group: partial(Scalars, self._entities, group) for group in groups}
         for key in self._reporters.keys() - self._wanted.keys():
@@ -65,23 +69,24 @@ class Reporters:
 class Diagnostics:
     """Publishes one DiagnosticStatus a group, `<node>: <group>`; the suggestion is among its values."""
 
-    def __init__(self, node: Any, entities: Entities) -> None:
+    def __init__(self, node: Node, entities: Entities, *, now: Callable[[], int]) -> None:
         """Raise RefusedError where DDS does not make the publisher."""
         self._node = node
         self._entities = entities
-        self._name = node.get_fully_qualified_name()
-        self._publisher = entities.publisher(DiagnosticArray, DIAGNOSTICS, 10)
+        self._now = now
+        self._name = node.name
+        self._publisher = entities.publisher(DiagnosticArray, DIAGNOSTICS, Profile())
 
     def publish(self, reports: Sequence[GroupReport], *, advice: str | None) -> None:
         """Publish the state of all groups, and of a managed node that gives nothing, if anyone listens."""
-        if self._publisher.get_subscription_count():
+        if self._publisher.is_heard():
             array = DiagnosticArray(status=[self._status(report) for report in reports])
             if advice is not None:
                 warn, name = DiagnosticStatus.WARN, self._name
                 array.status.append(
                     DiagnosticStatus(level=warn, name=name.lstrip("/"), message=advice, hardware_id=name)
                 )
-            array.header.stamp = self._node.get_clock().now().to_msg()
+            array.header.stamp.sec, array.header.stamp.nanosec = divmod(self._now(), _NS_PER_SECOND)
             self._publisher.publish(array)
 
     def close(self) -> None:
@@ -105,10 +110,10 @@ class Scalars:
         """Raise RefusedError where DDS does not make one of the publishers."""
         self._entities = entities
         self._group = group
-        self._publishers: dict[str, Any] = {}
+        self._publishers: dict[str, Publisher] = {}
         try:
             for figure in SCALARS:
-                self._publishers[figure] = entities.publisher(Float64, f"~/{group}/{figure}", 10)
+                self._publishers[figure] = entities.publisher(Float64, f"~/{group}/{figure}", Profile())
         except RefusedError:
             self.close()
             raise

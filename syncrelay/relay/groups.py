@@ -1,9 +1,8 @@
 """The groups of the file: which of them run, and how a reload puts those of another file in their place."""
 
 import logging
-import time
 from collections.abc import Callable, Collection, Sequence
-from typing import Any, Final
+from typing import Final
 
 from syncrelay.config import Config, ConfigError, GroupConfig
 from syncrelay.config.difference import section_changes
@@ -13,9 +12,11 @@ from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError
 from syncrelay.explain import Tape
-from syncrelay.ros.bindings import GroupBindings
-from syncrelay.ros.clock import WaitingClock
-from syncrelay.ros.manifests import Manifests
+from syncrelay.relay.bindings import GroupBindings
+from syncrelay.relay.clock import WaitingClock
+from syncrelay.relay.manifests import Manifests
+from syncrelay.relay.ports import Node
+from syncrelay.runtime import Runtime
 from syncrelay.sync import DropReason
 
 _LOG = logging.getLogger("syncrelay")
@@ -32,19 +33,19 @@ class Groups:
         config: Config,
         *,
         chosen: Collection[str] | None,
-        node: Any,
-        resolve: Callable[[str], str],
+        node: Node,
         bindings: GroupBindings,
         manifests: Manifests,
         loop: ReceiveLoop,
         clock: WaitingClock,
+        runtime: Runtime,
         flow: type[Flow],
         tape: Tape,
         changed: Callable[[Config], None],
     ) -> None:
         """Run the groups with the names `chosen`, None for all.
 
-        `changed` is called with the file whenever other groups run. `resolve` gives a topic's name after all remaps.
+        `changed` is called with the file whenever other groups run.
         """
         self.config = config
         self.bindings = bindings
@@ -55,15 +56,15 @@ class Groups:
         self.is_paused = False
         self._names = chosen
         self._node = node
-        self._resolve = resolve
         self._loop = loop
         self._clock = clock
+        self._runtime = runtime
         self._flow = flow
         self._tape = tape
         self._changed = changed
         # What each group waits for, as the log last said; None for a group that runs.
         self._announced: dict[str, str | None] = {}
-        self._started = time.monotonic()
+        self._started = self._runtime.monotonic()
         self._run(config)
 
     def reload(self, config: Config) -> str:
@@ -74,7 +75,7 @@ class Groups:
         and ConfigError where remaps give two topics one name.
         """
         _require_same_node(self.config, config)
-        require_distinct_names(config, self._names, self._resolve)
+        require_distinct_names(config, self._names, self._node.resolve_topic)
         before = self.bindings.groups
         try:
             changed = self._run(config)
@@ -95,7 +96,7 @@ class Groups:
         What it raises is as for `reload`; then no groups run.
         """
         _require_same_node(self.config, config)
-        require_distinct_names(config, self._names, self._resolve)
+        require_distinct_names(config, self._names, self._node.resolve_topic)
         self.bindings.is_held = True
         self._run(config)
         self.config = config
@@ -105,7 +106,7 @@ class Groups:
         """Receive and publish, each group anew."""
         self.bindings.release()
         self._announced.clear()
-        self._started = time.monotonic()
+        self._started = self._runtime.monotonic()
         self._run(self.config)
 
     def hold(self, *, patience_ns: int) -> None:
@@ -121,7 +122,7 @@ class Groups:
 
     def wait_until_acknowledged(self, *, patience_ns: int) -> None:
         """Give reliable subscribers so many nanoseconds to get what was published last."""
-        deadline = time.monotonic_ns() + patience_ns
+        deadline = self._runtime.monotonic_ns() + patience_ns
         self.bindings.wait_until_acknowledged(deadline)
         self.manifests.wait_until_acknowledged(deadline)
 
@@ -170,7 +171,7 @@ class Groups:
 
     def _begun(self, config: GroupConfig) -> GroupRelay:
         now = self._clock.now if config.ticks is None else self._clock.stamping
-        group = GroupRelay(config, now=now, flow=self._flow, tape=self._tape)
+        group = GroupRelay(config, now=now, flow=self._flow, tape=self._tape, runtime=self._runtime)
         if self.is_paused:
             group.pause()
         return group
@@ -205,13 +206,13 @@ class Groups:
             return
         for binding in self.bindings.all:
             name, waiting_for = binding.group.config.name, binding.waiting_for
-            if waiting_for and time.monotonic() - self._started < _GRACE_S:
+            if waiting_for and self._runtime.monotonic() - self._started < _GRACE_S:
                 continue
             if name in self._announced and self._announced[name] == waiting_for:
                 continue
             self._announced[name] = waiting_for
             # The names after all remaps, as the graph shows them.
-            pairs = [(each.topic.name, self._node.resolve_topic_name(each.output.topic)) for each in binding.inputs]
+            pairs = [(each.topic.name, self._node.resolve_topic(each.output.topic)) for each in binding.inputs]
             flow = ", ".join(f"{topic} -> {output}" for topic, output in pairs)
             text = f"waiting for {waiting_for}" if waiting_for else f"running: {flow}"
             _LOG.info("%s: %s", name, text, extra={"group": name})
