@@ -74,7 +74,7 @@ class Monitor:
         self.standstills = Standstills(runtime=runtime)
         self._discovery = Discovery(now=runtime.monotonic())
         self._system_clock = SystemClock(runtime=runtime)
-        self._try_budget = TryBudget()
+        self._try_budget = TryBudget(runtime.thread_time_ns)
         self._cause_log = CauseLog()
         self._empty_graph: GraphSnapshot | None = None
         self._ends_pauses = node.resolve_service("~/resume")
