@@ -15,7 +15,6 @@ _ROS: Final = _PACKAGE / "ros"
 _WITHOUT_IMPORT: Final = {
     "syncrelay.ros": "the package",
     "syncrelay.ros.environment": "asks whether rclpy can be imported at all",
-    "syncrelay.relay.types": "imports message classes by name",
     "syncrelay.ros.leaving": "takes a node from librcl through ctypes",
 }
 
