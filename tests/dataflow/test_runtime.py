@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from syncrelay.config import load_text
 from syncrelay.config.rereading import ConfigFiles
@@ -23,10 +23,10 @@ class _Clock:
 
     def __init__(self) -> None:
         self.now = 0
-        self.runtime: Any = SystemRuntime()
-        self.runtime.monotonic_ns = self.runtime.time_ns = lambda: self.now
-        self.runtime.monotonic = lambda: self.now / 1e9
-        self.runtime.sleep = self.sleep
+        self.runtime = runtime = cast("Any", SystemRuntime())
+        runtime.monotonic_ns = runtime.time_ns = lambda: self.now
+        runtime.monotonic = lambda: self.now / 1e9
+        runtime.sleep = self.sleep
 
     def sleep(self, seconds: float) -> None:
         self.now += round(seconds * 1e9)
