@@ -12,7 +12,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Where an image sets it, each process that the tests start would compile all modules of this tree again: 0.06 to 0.2 s.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-fast test-kilted test-container test-workspace test-fleet test-lerobot test-release test-bare faults soak lint schema reference docs bench wheel release clean
+.PHONY: demo test test-fast simulate test-kilted test-container test-workspace test-fleet test-lerobot test-release test-bare faults soak lint schema reference docs bench wheel release clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -74,6 +74,11 @@ faults: $(VENV)/test
 # A quarter of an hour and two million messages.
 soak: $(VENV)/test
 	SYNCRELAY_FAULTS=long $(BIN)/python -m pytest -m soak $(ARGS)
+
+# Plays the whole relay in worlds drawn by seeds, in virtual time, with faults at any moment, and checks what must always
+# hold; docs/explanation/simulator.md says more. A failure prints its seed and the smallest world that still fails.
+simulate: $(VENV)/test
+	$(BIN)/python -m tests.simulated --seed $(or $(SEED),1) --hours $(or $(HOURS),10) $(ARGS)
 
 lint: $(VENV)/lint
 	$(BIN)/ruff check .

@@ -127,6 +127,8 @@ class GroupFigures:
     """The latencies of the last sets."""
     nearest: Distribution = NOTHING
     """The span of the tightest set of each of the last messages of the input that sets the pace."""
+    nearest_lately: Distribution = NOTHING
+    """Those of the window, and no fewer than 20 where there are."""
     nearest_since: Distribution = NOTHING
     """Those of them that were measured after the last set."""
     nearest_from: int = 0

@@ -61,6 +61,7 @@ class Observation:
             if not topic.required and distance is Distance.SPAN
         }
         self._nearest, self._nearest_at, self._nearest_since = no_values(), no_values(), no_values()
+        self._measured_at = began
         self._paces: list[float | None] = [None] * len(self.inputs)
         self._sets_since_without = [0] * len(self.inputs)
 
@@ -115,12 +116,16 @@ class Observation:
             spans=Distribution(self._spans[:]),
             latencies=Distribution(self._latencies[:]),
             nearest=Distribution(self._nearest[:]),
+            nearest_lately=Distribution(self._nearest[self._lately(now) :]),
             nearest_since=Distribution(self._nearest_since[:]),
             nearest_from=self._nearest_at[0] if self._nearest_at else now,
             missing=self._missing(now),
             sets_since_without=tuple(self._sets_since_without),
         )
         return group, inputs
+
+    def _lately(self, now: int) -> int:
+        return bisect_left(self._nearest_at, now - WINDOW_NS, 0, max(0, len(self._nearest_at) - _FEWEST_NEAREST))
 
     def begin_again(self, at: int) -> None:
         """Bear that nothing was fed for a while, until now: what came before tells nothing. What left is kept."""
@@ -172,7 +177,10 @@ class Observation:
                 [shifted[index] for index in self._measured], pivot=self._measured.index(pivot)
             )
             keep_last(self._nearest, measured, _LAST_SETS)
-            keep_last(self._nearest_at, [now] * len(measured), _LAST_SETS)
+            # They may have waited for a partner that was silent: they came after the last that were measured.
+            keep_last(self._nearest_at, [self._measured_at] * len(measured), _LAST_SETS)
+            if measured:
+                self._measured_at = now
             a_while_ago, surplus = now - _NEAREST_WINDOW, max(0, len(self._nearest_at) - _FEWEST_NEAREST)
             old = bisect_left(self._nearest_at, a_while_ago, 0, surplus)
             del self._nearest[:old], self._nearest_at[:old]

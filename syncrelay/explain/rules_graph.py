@@ -9,6 +9,7 @@ from syncrelay.explain import words
 from syncrelay.explain.codes import Severity
 from syncrelay.explain.facts import Endpoint, GraphSnapshot, GroupFacts, InputFacts, serving
 from syncrelay.explain.findings import SECOND, Fault, Found, absence, blocks
+from syncrelay.sync.messages import DropReason
 
 _NO_MESSAGE: Final = 5 * SECOND
 # Fast DDS's lease: a killed node stays in the graph this long.
@@ -298,6 +299,9 @@ def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Fault | None
             input=index,
         )
     if not _is_silent(facts, an_input, quiet) or (facts.is_held(index) and _is_enough(facts, an_input)):
+        return None
+    if DropReason.MALFORMED in figures.dropped:
+        # Messages come, of which none can be read.
         return None
     until_then = f"; before that its rate was {words.rate(figures.usual_hz)}" if figures.usual_hz else ""
     return Fault(

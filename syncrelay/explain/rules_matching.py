@@ -55,6 +55,10 @@ def over_slop(facts: GroupFacts) -> Found:
     if tolerance is None or len(nearest) < _FEWEST or next(other_clock(facts), None):
         return
     over = nearest.share_over(tolerance.ns)
+    if not facts.is_silent:
+        # What was so a while ago, as while an input was away, is no more.
+        lately = facts.figures.nearest_lately or nearest
+        over = min(over, lately.share_over(tolerance.ns))
     came_at_once = any(each.required and each.figures.bursts for each in facts.inputs)
     if facts.is_silent and over > 1 - _MISSED:
         text, severity = _too_wide(facts, tolerance, nearest), Severity.ERROR

@@ -44,6 +44,8 @@ class Process:
         self.stalled_until = 0
         self.is_dead = False
         self.held: list[Task] = []
+        self.on_go_on: list[Callable[[], object]] = []
+        """Called when it goes on after a stall."""
 
     @property
     def is_still(self) -> bool:
@@ -61,6 +63,8 @@ class Process:
         if not self.is_still:
             held, self.held = self.held, []
             self.scheduler.make_ready(held)
+            for each in self.on_go_on:
+                each()
 
     def kill(self) -> None:
         """End it as SIGKILL does: none of its tasks runs again."""
@@ -399,7 +403,7 @@ class SimulatedThread:
         return not self._returned.done()
 
 
-# What a thread has used between two looks at its own clock, which it takes every 50 messages of a trial: a slow machine.
+# What a thread has used between two looks at its own clock, one every 50 messages of a trial: on a slow machine.
 _WORK_NS: Final = 2_000_000
 
 

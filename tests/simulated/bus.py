@@ -1,0 +1,449 @@
+"""A simulated DDS: discovery, matching by QoS, histories, losses and deaths, as they were observed of Fast DDS.
+
+Participants find each other, and each endpoint, after a time and in any order; the name of an endpoint's node comes by
+another message. A writer sends to a reader from when it has found it, and a reader takes from writers that it has
+found. Reliable data is resent, for as long as the writer's history holds it; other data may be lost. A dead participant
+stays in the graph until its lease ends. All times are in nanoseconds.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final, NamedTuple
+
+from syncrelay.config.profile import Profile, mismatch
+from tests.simulated.scheduler import MS, SECOND, Process, Scheduler
+
+# As rmw_fastrtps has it: who is dead is forgotten after that, and says that it lives every 3 s.
+_LEASE: Final = 20 * SECOND
+_SIGN_OF_LIFE: Final = 3 * SECOND
+# A reliable writer asks its readers what they lack at its next message, or after so long.
+_HEARTBEAT: Final = 3 * SECOND
+# What a process that stands still can be sent: ports of shared memory hold so many.
+_PORT: Final = 512
+_KEPT: Final = 5000
+
+
+class RefusedByDdsError(Exception):
+    """DDS does not make an endpoint."""
+
+
+@dataclass(slots=True)
+class Weather:
+    """How the network is; times in nanoseconds. The world may change it at any moment."""
+
+    discovery: int = 100 * MS
+    """The longest that an endpoint is found after."""
+    latency: int = 1 * MS
+    """The longest that a message usually takes."""
+    loss: float = 0.0
+    """The share of messages that are lost on the way once."""
+
+
+class Sample(NamedTuple):
+    """A message as it is sent."""
+
+    number: int
+    """How many the writer had written before."""
+    content: bytes
+    sent: int
+    """By the writer's system clock."""
+
+
+class Endpoint:
+    """A writer or a reader of a node."""
+
+    is_writer: bool
+
+    def __init__(self, node: "BusNode", topic: str, type_name: str, profile: Profile) -> None:
+        self.node = node
+        self.participant = node.participant
+        self.bus = node.participant.bus
+        self.topic = topic
+        self.type = type_name
+        self.profile = profile
+        self.is_ended = False
+        self.links: dict[Endpoint, Link] = {}
+        """By the other end: what is connected, or about to be."""
+
+    @property
+    def depth(self) -> int:
+        """How many messages its history keeps."""
+        return _KEPT if self.profile.history == "keep_all" else max(1, self.profile.depth)
+
+    def end(self) -> None:
+        """End it, in order: others hear of it."""
+        self.is_ended = True
+        self.participant.endpoints.discard(self)
+        self.bus.withdraw(self)
+
+
+class Writer(Endpoint):
+    """A writer."""
+
+    is_writer = True
+
+    def __init__(self, node: "BusNode", topic: str, type_name: str, profile: Profile) -> None:
+        self.written = 0
+        self.history: deque[Sample] = deque(maxlen=_KEPT if profile.history == "keep_all" else max(1, profile.depth))
+        super().__init__(node, topic, type_name, profile)
+
+    @property
+    def n_readers(self) -> int:
+        """How many readers it has found that it serves."""
+        return sum(link.is_sending for link in self.links.values())
+
+    @property
+    def is_acknowledged(self) -> bool:
+        """Whether its reliable readers have all that was written."""
+        return not any(link.under_way for link in self.links.values() if link.is_reliable)
+
+    def write(self, content: bytes, *, dies: bool = False) -> None:
+        """Write a message; with `dies`, its process is killed in the midst of that."""
+        bus = self.bus
+        sample = Sample(self.written, content, self.participant.process.time_ns())
+        self.written += 1
+        self.history.append(sample)
+        if bus.written is not None:
+            bus.written(self, sample)
+        links = [link for link in self.links.values() if link.is_sending]
+        if dies:
+            links = links[: int(bus.random() * (len(links) + 1))]
+        for link in links:
+            link.send(sample)
+        if dies:
+            self.participant.process.kill()
+            bus.buried(self.participant)
+
+    def holds(self, sample: Sample) -> bool:
+        """Whether its history still has a message, to resend it."""
+        return not self.participant.process.is_dead and self.written - sample.number <= self.depth
+
+
+class Reader(Endpoint):
+    """A reader; `on_data` is called for each message that arrives, in an event."""
+
+    is_writer = False
+
+    def __init__(
+        self, node: "BusNode", topic: str, type_name: str, profile: Profile, on_data: Callable[[], object]
+    ) -> None:
+        self.queue: deque[tuple[Sample, int]] = deque(maxlen=_KEPT)
+        """What has not been taken, with the time of its receipt by the system clock of its process."""
+        self.lost = 0
+        self.on_data = on_data
+        super().__init__(node, topic, type_name, profile)
+
+    def take(self) -> tuple[bytes, int] | None:
+        """Take the oldest message, and when it was received."""
+        lifespan = self.profile.lifespan
+        while self.queue:
+            sample, received = self.queue.popleft()
+            if not lifespan or self.participant.process.time_ns() - sample.sent <= lifespan:
+                return sample.content, received
+        return None
+
+
+class Link:
+    """A writer and a reader that fit."""
+
+    def __init__(self, writer: Writer, reader: Reader) -> None:
+        self.writer, self.reader = writer, reader
+        self.is_sending = False
+        """Whether the writer has found the reader."""
+        self.is_receiving = False
+        """Whether the reader has found the writer."""
+        self.is_reliable = "best_effort" not in (writer.profile.reliability, reader.profile.reliability)
+        self.waiting: list[Sample] = []
+        """What was sent before the reader had found the writer, or while its process stood still."""
+        self.last = 0
+        self.under_way = 0
+        self.expected: int | None = None
+
+    def found_by_writer(self) -> None:
+        """Begin to send."""
+        self.is_sending = True
+        wants_past = "transient_local" == self.writer.profile.durability == self.reader.profile.durability
+        for sample in list(self.writer.history) if wants_past else ():
+            self.send(sample)
+
+    def found_by_reader(self) -> None:
+        """Begin to receive."""
+        self.is_receiving = True
+        if not self.is_reliable or self.writer.participant.process.is_dead:
+            self.under_way -= len(self.waiting)
+            self.waiting.clear()
+        self._send_waiting()
+
+    def send(self, sample: Sample) -> None:
+        """Send a message on its way."""
+        bus = self.writer.bus
+        self.under_way += 1
+        if not self.is_receiving or self.reader.participant.process.is_still:
+            self.waiting.append(sample)
+            return
+        when = bus.scheduler.now + int(bus.weather.latency * bus.random() ** 2)
+        resent = bool(bus.weather.loss) and bus.random() < bus.weather.loss
+        if resent:
+            if not self.is_reliable:
+                self._lose(sample)
+                return
+            when += int(_HEARTBEAT * bus.random() ** 4) + MS
+        self.last = when = max(when, self.last)
+        bus.scheduler.at(when, lambda: self._arrive(sample, resent=resent))
+
+    def _send_waiting(self) -> None:
+        waiting, self.waiting = self.waiting, []
+        bus = self.writer.bus
+        for number, sample in enumerate(waiting):
+            if self.is_reliable and self.writer.holds(sample):
+                self.last = max(self.last, bus.scheduler.now + int(20 * MS * bus.random()))
+            elif number >= _PORT:
+                self._lose(sample)
+                continue
+            else:
+                self.last = max(self.last, bus.scheduler.now)
+            bus.scheduler.at(self.last, partial(self._arrive, sample, resent=False))
+
+    def go_on(self) -> None:
+        """Have what was sent to a process that stood still arrive."""
+        if self.is_receiving:
+            self._send_waiting()
+
+    def _lose(self, sample: Sample) -> None:
+        self.under_way -= 1
+        if self.expected is not None:
+            self.reader.lost += 1
+            self.expected = sample.number + 1
+
+    def _arrive(self, sample: Sample, *, resent: bool) -> None:
+        reader = self.reader
+        if reader.is_ended or not self.is_receiving:
+            return
+        process = reader.participant.process
+        if process.is_still:
+            self.waiting.append(sample)
+            return
+        if resent and not self.writer.holds(sample):
+            self._lose(sample)
+            return
+        self.under_way -= 1
+        self.expected = sample.number + 1
+        if len(reader.queue) >= reader.depth:
+            reader.queue.popleft()
+        reader.queue.append((sample, process.time_ns()))
+        reader.on_data()
+
+
+class BusNode:
+    """A node, as the graph shows it."""
+
+    def __init__(self, participant: "Participant", name: str, namespace: str) -> None:
+        self.participant = participant
+        self.name, self.namespace = name, namespace
+
+    @property
+    def full_name(self) -> str:
+        return f"{self.namespace.rstrip('/')}/{self.name}"
+
+    def writer(self, topic: str, type_name: str, profile: Profile) -> Writer:
+        """Make a writer. Raises RefusedByDdsError."""
+        return self.participant.make(Writer(self, topic, type_name, profile))
+
+    def reader(
+        self, topic: str, type_name: str, profile: Profile, on_data: Callable[[], object] = lambda: None
+    ) -> Reader:
+        """Make a reader. Raises RefusedByDdsError."""
+        return self.participant.make(Reader(self, topic, type_name, profile, on_data))
+
+
+class Participant:
+    """A participant of a process, and what it has found of others."""
+
+    def __init__(self, bus: "Bus", process: Process) -> None:
+        self.bus = bus
+        self.process = process
+        self.nodes: list[BusNode] = []
+        self.endpoints: set[Endpoint] = set()
+        self.found: dict[Endpoint, None] = {}
+        """The endpoints that it has found, its own too, in the order in which it did."""
+        self.named: dict[BusNode, None] = {}
+        """The nodes whose names it has, its own too."""
+        self.changes = 0
+        """How often what it has found has changed."""
+        self.has_left = False
+        self.on_change: Callable[[], object] = lambda: None
+
+    def node(self, name: str, namespace: str = "/") -> BusNode:
+        """Make a node."""
+        made = BusNode(self, name, namespace)
+        self.nodes.append(made)
+        self.bus.announce_node(made)
+        return made
+
+    def make(self, endpoint: Any) -> Any:
+        """Have an endpoint found. Raises RefusedByDdsError for a second type on a topic."""
+        self.bus.may_make(endpoint)
+        held = next((each.type for each in self.endpoints if each.topic == endpoint.topic), endpoint.type)
+        if held != endpoint.type:
+            raise RefusedByDdsError(f"topic {endpoint.topic} is {held} in this participant")
+        self.endpoints.add(endpoint)
+        self.bus.announce(endpoint)
+        return endpoint
+
+    def leave(self) -> None:
+        """Leave in order."""
+        for endpoint in list(self.endpoints):
+            endpoint.end()
+        self.bus.left(self)
+
+    def kill(self) -> None:
+        """End the process as SIGKILL does."""
+        self.process.kill()
+        self.bus.buried(self)
+
+    def see(self, endpoint: Endpoint) -> None:
+        """Find an endpoint."""
+        if endpoint.is_ended or self.process.is_dead or endpoint in self.found:
+            return
+        self.found[endpoint] = None
+        for mine in [each for each in self.endpoints if each.topic == endpoint.topic]:
+            self._connect(mine, endpoint)
+        self._change()
+
+    def _connect(self, mine: Endpoint, other: Endpoint) -> None:
+        if isinstance(mine, Writer) and isinstance(other, Reader):
+            link = self.bus.link(mine, other)
+            if link is not None and not link.is_sending:
+                link.found_by_writer()
+        elif isinstance(mine, Reader) and isinstance(other, Writer):
+            link = self.bus.link(other, mine)
+            if link is not None and not link.is_receiving:
+                link.found_by_reader()
+
+    def found_own(self, endpoint: Endpoint) -> None:
+        """Match an endpoint that was just made with all that was found before."""
+        self.found[endpoint] = None
+        for other in [each for each in self.found if each.topic == endpoint.topic]:
+            self._connect(endpoint, other)
+            if other.participant is self:
+                self._connect(other, endpoint)
+        self._change()
+
+    def lose(self, endpoint: Endpoint) -> None:
+        """Hear that an endpoint has ended."""
+        if self.found.pop(endpoint, self) is None:
+            for mine in [each for each in self.endpoints if each.topic == endpoint.topic]:
+                mine.links.pop(endpoint, None)
+            self._change()
+
+    def learn(self, node: BusNode) -> None:
+        """Hear the name of a node, and which endpoints are its."""
+        if not self.process.is_dead and not node.participant.has_left:
+            self.named[node] = None
+            self._change()
+
+    def forget(self, other: "Participant") -> None:
+        """Forget a participant that left, or whose lease has ended."""
+        for endpoint in [each for each in self.found if each.participant is other]:
+            self.lose(endpoint)
+        for node in other.nodes:
+            self.named.pop(node, None)
+        self._change()
+
+    def _change(self) -> None:
+        self.changes += 1
+        self.on_change()
+
+
+class Bus:
+    """The DDS of one domain."""
+
+    def __init__(self, scheduler: Scheduler, weather: Weather | None = None) -> None:
+        self.scheduler = scheduler
+        self.weather = weather or Weather()
+        self.random = scheduler.stream("bus").random
+        self.participants: list[Participant] = []
+        self.written: Callable[[Writer, Sample], object] | None = None
+        """Called at each write."""
+        self.may_make: Callable[[Endpoint], object] = lambda _: None
+        """Called before each endpoint is made: what it raises, as a RefusedByDdsError, refuses that."""
+
+    def participant(self, process: Process) -> Participant:
+        """Have a process join."""
+        made = Participant(self, process)
+        others = list(self._others(made))
+        self.participants.append(made)
+        process.on_go_on.append(lambda: self._go_on(made))
+        for other in others:
+            for node in other.nodes:
+                self._later(made, partial(made.learn, node))
+            for endpoint in other.endpoints:
+                self._later(made, partial(made.see, endpoint))
+        return made
+
+    def announce_node(self, node: BusNode) -> None:
+        """Have others hear a node's name."""
+        node.participant.learn(node)
+        for other in self._others(node.participant):
+            self._later(other, partial(other.learn, node))
+
+    def announce(self, endpoint: Endpoint) -> None:
+        """Have others find an endpoint."""
+        endpoint.participant.found_own(endpoint)
+        for other in self._others(endpoint.participant):
+            self._later(other, partial(other.see, endpoint))
+
+    def withdraw(self, endpoint: Endpoint) -> None:
+        """Have others hear that an endpoint has ended."""
+        endpoint.participant.lose(endpoint)
+        for other in self._others(endpoint.participant):
+            self._later(other, partial(other.lose, endpoint))
+
+    def left(self, participant: Participant) -> None:
+        """Have others hear that a participant has left."""
+        participant.has_left = True
+        self.participants.remove(participant)
+        for other in self.participants:
+            self._later(other, partial(other.forget, participant))
+
+    def buried(self, participant: Participant) -> None:
+        """Have others forget a dead participant, each when its lease ends there."""
+        participant.has_left = True
+        self.participants.remove(participant)
+        for other in self.participants:
+            delay = _LEASE - int(_SIGN_OF_LIFE * self.random())
+            self.scheduler.after(delay, partial(other.forget, participant))
+
+    def link(self, writer: Writer, reader: Reader) -> Link | None:
+        """Return what connects these, None if they do not fit."""
+        link = writer.links.get(reader)
+        if link is None and not writer.is_ended and not reader.is_ended:
+            if writer.type != reader.type or mismatch(writer.profile, reader.profile) is not None:
+                return None
+            link = writer.links[reader] = reader.links[writer] = Link(writer, reader)
+        return link
+
+    def _go_on(self, participant: Participant) -> None:
+        for endpoint in participant.endpoints:
+            for link in list(endpoint.links.values()) if isinstance(endpoint, Reader) else ():
+                link.go_on()
+
+    def _others(self, than: Participant) -> Iterator[Participant]:
+        return (each for each in self.participants if each is not than)
+
+    def _later(self, of: Participant, event: Callable[[], object]) -> None:
+        """Do what a participant hears of, once it runs."""
+
+        def hear() -> None:
+            process = of.process
+            if process.is_dead:
+                return
+            if process.is_still:
+                self.scheduler.at(process.stalled_until, hear)
+            else:
+                event()
+
+        # Mostly soon, and at times not.
+        self.scheduler.after(int(self.weather.discovery * self.random() ** 2) + 1, hear)

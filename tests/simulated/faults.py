@@ -1,0 +1,379 @@
+"""What may happen in a world: how it begins and ends, and what is true meanwhile.
+
+A new kind is a function here. It is called when it begins, and returns what ends it, or None.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Final, TypeAlias
+
+from syncrelay.config.profile import Profile
+from tests.simulated.plan import TYPE, Group, Plan
+from tests.simulated.scheduler import MS, SECOND, Process
+from tests.simulated.world import OTHER_TYPE, Driver, World
+
+_HOUR: Final = 3600 * SECOND
+End: TypeAlias = Callable[[], object] | None
+_Begin: TypeAlias = Callable[[World, str, float], End]
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of event, and what is true while it lasts."""
+
+    begin: _Begin
+    needs: tuple[str, ...]
+    """`sensor` or `group` where it is about one; `sim`, `real`, `managed`, `several` where the world must be so."""
+    names: frozenset[str]
+    """The first finding of the groups that it concerns is one of these, if any; `starting` and `healthy` go without."""
+    must: bool
+    """Whether there must be one, where nothing makes up for it."""
+    spoils: bool
+    """Whether sets may be missing meanwhile."""
+
+
+KINDS: Final[dict[str, Kind]] = {}
+
+
+def _kind(*needs: str, names: str = "", must: bool = False, spoils: bool = True) -> Callable[[_Begin], _Begin]:
+    def add(begin: _Begin) -> _Begin:
+        name = begin.__name__
+        KINDS[name] = Kind(begin, needs, frozenset(names.split()), must, spoils)
+        return begin
+
+    return add
+
+
+def needs() -> Mapping[str, tuple[str, ...]]:
+    """Return what each kind is about, as `plan.draw` takes it."""
+    return {name: kind.needs for name, kind in KINDS.items()}
+
+
+def concerns(kind: str, target: str, group: Group) -> bool:
+    """Whether an event concerns a group."""
+    needed = KINDS[kind].needs
+    if "sensor" in needed:
+        return target in group.topics
+    return target == group.name if "group" in needed else True
+
+
+def is_felt(kind: str, target: str, group: Group, plan: Plan) -> bool:
+    """Whether the group must say so: where an input is optional, a message serves again, or others are left, it may."""
+    if not KINDS[kind].must or target in group.optional:
+        return False
+    sensor = next((each for each in plan.sensors if each.topic == target), None)
+    if kind in ("halves", "other_clock", "twice"):
+        return sensor is not None and sensor.every == 1 and not group.repeats and "key" not in group.options
+    return True
+
+
+def _set(world: World, target: str, **changes: object) -> Callable[[], None]:
+    """Change a driver; what is returned changes it back."""
+    driver = world.drivers[target]
+    before = {key: getattr(driver, key) for key in changes}
+
+    def put(values: Mapping[str, object]) -> None:
+        for key, value in values.items():
+            setattr(driver, key, value)
+
+    put(changes)
+    return partial(put, before)
+
+
+def _returning(world: World, target: str, **changes: object) -> Callable[[], None]:
+    """Have a driver end and return at once as another; what is returned has it return as it was."""
+    driver = world.drivers[target]
+
+    def exchange(driver: Driver, change: Callable[[], object]) -> None:
+        driver.leave()
+        change()
+        world.scheduler.after(200 * MS, driver.start)
+
+    back: list[Callable[[], None]] = []
+    exchange(driver, lambda: back.append(_set(world, target, **changes)))
+    return lambda: exchange(driver, back[0])
+
+
+@_kind("sensor", names="silent slowed", must=True)
+def silent(world: World, target: str, _: float) -> End:
+    """The publisher is there, and sends nothing."""
+    return _set(world, target, is_silent=True)
+
+
+@_kind("sensor", names="no_publisher alone", must=True)
+def leaves(world: World, target: str, _: float) -> End:
+    """The driver ends in order."""
+    world.drivers[target].leave()
+    return world.drivers[target].start
+
+
+@_kind("sensor", names="no_publisher silent slowed", must=True)
+def dies(world: World, target: str, _: float) -> End:
+    """The driver is killed."""
+    world.drivers[target].die()
+    return world.drivers[target].start
+
+
+@_kind("sensor", names="no_publisher silent slowed", must=True)
+def dies_in_write(world: World, target: str, _: float) -> End:
+    """The driver is killed in the midst of a message."""
+    world.drivers[target].dies_in_write = True
+
+    def back() -> None:
+        world.drivers[target].dies_in_write = False
+        world.drivers[target].die()
+        world.drivers[target].start()
+
+    return back
+
+
+@_kind("sensor", names="no_publisher silent")
+def restarts(world: World, target: str, _: float) -> End:
+    """The driver ends and comes back at once."""
+    _returning(world, target)
+    return None
+
+
+@_kind("sensor", names="slowed silent few_sets", must=True)
+def halves(world: World, target: str, _: float) -> End:
+    """Every second message is not sent."""
+    return _set(world, target, is_halved=True)
+
+
+@_kind("sensor", names="unstamped", must=True)
+def unstamped(world: World, target: str, _: float) -> End:
+    """Stamps are 0."""
+    return _set(world, target, is_zero=True)
+
+
+@_kind("sensor", names="malformed", must=True)
+def malformed(world: World, target: str, _: float) -> End:
+    """Messages are cut off."""
+    return _set(world, target, is_cut=True)
+
+
+@_kind("sensor", names="other_clock clock_step time_jump", must=True)
+def other_clock(world: World, target: str, _: float) -> End:
+    """Stamps are an hour off; no time is before 0."""
+    return _set(world, target, shift=_HOUR if world.plan.by_sim_time else -_HOUR)
+
+
+@_kind("sensor", names="duplicates several_publishers", must=True, spoils=False)
+def twice(world: World, target: str, _: float) -> End:
+    """Every message comes twice."""
+    return _set(world, target, is_twice=True)
+
+
+@_kind("sensor", names="bursts short_queue silent slowed waiting_for_optional few_sets out_of_order")
+def batches(world: World, target: str, _: float) -> End:
+    """Messages are held back, and sent together."""
+    return _set(world, target, batch=1500 * MS)
+
+
+@_kind("sensor", names="other_type several_types no_publisher alone", must=True)
+def other_type(world: World, target: str, _: float) -> End:
+    """The driver comes back with messages of another type."""
+    return _returning(world, target, type=OTHER_TYPE)
+
+
+@_kind("sensor", names="no_publisher silent")
+def best_effort(world: World, target: str, _: float) -> End:
+    """The driver comes back with another reliability, which the relay follows."""
+    return _returning(world, target, reliability="best_effort")
+
+
+@_kind("sensor", names="several_publishers duplicates out_of_order clock_step time_jump", spoils=True, must=True)
+def second_publisher(world: World, target: str, _: float) -> End:
+    """Another node publishes on the topic, of another clock."""
+    driver = Driver(world, world.drivers[target].sensor, world.drivers[target].index)
+    driver.shift = -3 * SECOND
+    driver.start()
+    return driver.leave
+
+
+@_kind(names="messages_lost slowed silent bursts")
+def loss(world: World, _: str, __: float) -> End:
+    """The network loses a third of all messages."""
+    weather = world.bus.weather
+    before, weather.loss = weather.loss, 0.3
+
+    def end() -> None:
+        weather.loss = before
+
+    return end
+
+
+@_kind(names="too_slow messages_lost short_queue few_sets silent bursts slowed")
+def stall(world: World, _: str, seconds: float) -> End:
+    """The relay's process gets no processor."""
+    if world.relay is not None:
+        world.relay.process.stall(round(min(seconds, 8.0) * SECOND))
+    return None
+
+
+@_kind("real", names="clock_step")
+def clock_set(world: World, _: str, __: float) -> End:
+    """This machine's clock is set."""
+    world.set_clock(world.random.choice([-90, -2, 3, 3600]) * SECOND)
+    return None
+
+
+@_kind(names="paused", must=True)
+def pause(world: World, _: str, __: float) -> End:
+    """~/pause, and ~/resume in the end."""
+    world.ask("pause")
+    return partial(world.ask, "resume")
+
+
+@_kind(names="refused_by_dds", must=True)
+def refuse_messages(world: World, _: str, __: float) -> End:
+    """DDS takes no message from the relay."""
+
+    def refuse(why: str | None) -> None:
+        node = world.relay.node if world.relay is not None else None
+        for publisher in node.publishers if node is not None else ():
+            publisher.refusal = why
+
+    refuse("out of samples")
+    return partial(refuse, None)
+
+
+@_kind(names="output_taken", must=True, spoils=False)
+def output_taken(world: World, _: str, __: float) -> End:
+    """Another node publishes on the outputs."""
+    participant = world.bus.participant(Process(world.scheduler, "rival"))
+    node = participant.node("rival")
+    for topic in world.outputs:
+        node.writer(topic, TYPE, Profile())
+    return participant.leave
+
+
+@_kind(spoils=False)
+def newcomers(world: World, _: str, __: float) -> End:
+    """Nodes that have nothing to do with the relay come and go."""
+    participant = world.bus.participant(Process(world.scheduler, "newcomer"))
+    node = participant.node("newcomer", "/elsewhere")
+    node.writer("/elsewhere/odd", OTHER_TYPE, Profile())
+    node.reader("/elsewhere/even", TYPE, Profile())
+    return participant.leave
+
+
+@_kind(spoils=False)
+def services(world: World, _: str, __: float) -> End:
+    """Somebody asks how it stands, again and again."""
+    for name in ("status", "status", "status"):
+        world.ask(name)
+    return partial(world.ask, "status")
+
+
+@_kind(spoils=False)
+def reload_same(world: World, _: str, __: float) -> End:
+    """The file is read again, and says the same."""
+    world.reload()
+    return None
+
+
+@_kind(spoils=False)
+def reload_faulty(world: World, _: str, __: float) -> End:
+    """The file is not valid for a while; or it is written in parts."""
+    whole = world.path.read_text()
+    world.write_file(whole[: int(len(whole) * world.random.random())])
+    world.reload()
+
+    def mend() -> None:
+        world.write_file()
+        world.reload()
+
+    return mend
+
+
+@_kind("group", names="no_publisher silent")
+def reload_changed(world: World, target: str, _: float) -> End:
+    """A group is exchanged for one of other values."""
+    world.changed[target] = world.changed.get(target, 0) + 1
+    world.write_file()
+    world.reload()
+    return None
+
+
+@_kind("group", "several")
+def reload_without(world: World, target: str, _: float) -> End:
+    """A group is taken from the file, and put back."""
+    if len(world.absent) == len(world.plan.groups) - 1:
+        return None
+    world.absent.add(target)
+    world.write_file()
+    world.reload()
+
+    def back() -> None:
+        world.absent.discard(target)
+        world.write_file()
+        world.reload()
+
+    return back
+
+
+@_kind("group", names="refused_by_dds")
+def reload_refused(world: World, target: str, _: float) -> End:
+    """DDS makes nothing on the outputs, while a group is exchanged."""
+    world.refusal = "no memory"
+    world.changed[target] = world.changed.get(target, 0) + 1
+    world.write_file()
+    world.reload()
+
+    def back() -> None:
+        world.refusal = None
+        world.reload()
+
+    return back
+
+
+@_kind(names="nobody_listens")
+def nobody_listens(world: World, _: str, __: float) -> End:
+    """Who listens to all outputs leaves."""
+    world.witness.leave()
+    return world.witness.start
+
+
+@_kind("managed", names="inactive", must=True)
+def deactivate(world: World, _: str, __: float) -> End:
+    """The managed node is deactivated, and activated again."""
+    world.transit("deactivate")
+    return partial(world.transit, "activate")
+
+
+@_kind("managed", names="inactive")
+def configure_again(world: World, _: str, __: float) -> End:
+    """The managed node is taken back to its first state, by somebody who also asks for what is not possible."""
+    for name in ("configure", "deactivate", "activate", "deactivate", "cleanup"):
+        world.transit(name)
+
+    def back() -> None:
+        world.transit("configure")
+        world.transit("activate")
+
+    return back
+
+
+@_kind("sim", names="clock_stopped no_clock silent time_jump", must=True)
+def clock_stops(world: World, _: str, __: float) -> End:
+    """The simulation stands still, and goes on where it was."""
+    world.sim_stopped = world.scheduler.now
+    ends = [_set(world, topic, is_silent=True) for topic in world.drivers]
+
+    def go_on() -> None:
+        if world.sim_stopped is not None:
+            world.sim_offset -= world.scheduler.now - world.sim_stopped
+            world.sim_stopped = None
+        for end in ends:
+            end()
+
+    return go_on
+
+
+@_kind("sim", names="time_jump clock_step")
+def clock_loops(world: World, _: str, __: float) -> End:
+    """The simulation begins again."""
+    world.sim_offset = -world.scheduler.now
+    return None

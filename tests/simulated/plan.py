@@ -1,0 +1,264 @@
+"""What happens in a world: its rig, and the faults that it meets, drawn by a seed or cut down from such a plan."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from random import Random
+from typing import Any, Final, NamedTuple
+
+from tests.simulated.scheduler import MS
+
+# A rig has found itself by then, and what is said of it is to be true.
+SETTLED_S: Final = 25.0
+# What is to be named is named within this.
+NAMED_S: Final = 22.0
+# All is well again so long after a fault has ended.
+HEALED_S: Final = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """A driver with a topic of its own; all sample on one grid of moments."""
+
+    topic: str
+    every: int
+    """How many of its samples come at each moment of the rig: 1 for the slowest sensors."""
+    wobble: int
+    """How far a stamp may be from its place, in nanoseconds."""
+    takes: int
+    """How long after its stamp a message is published, in nanoseconds."""
+    reliability: str
+    durability: str
+    depth: int
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """A group of the file."""
+
+    name: str
+    topics: tuple[str, ...]
+    options: Mapping[str, Any]
+    inputs: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    @property
+    def optional(self) -> frozenset[str]:
+        return frozenset(topic for topic, keys in self.inputs.items() if keys.get("required") is False)
+
+    @property
+    def repeats(self) -> bool:
+        """Whether a message may be in several sets."""
+        return bool(self.options["policy"] == "latest_time")
+
+    @property
+    def by_clock(self) -> bool:
+        return str(self.options.get("trigger", "")).endswith("Hz")
+
+    @property
+    def required(self) -> tuple[str, ...]:
+        return tuple(each for each in self.topics if each not in self.optional)
+
+    def in_file(self, *, slop_factor: int = 1) -> dict[str, Any]:
+        """As it stands in the file; another `slop_factor` makes it another group that does the same."""
+        options = dict(self.options)
+        options["queue_size"] = options["queue_size"] + slop_factor - 1
+        rows = [{"topic": each, "type": TYPE, **self.inputs.get(each, {})} for each in self.topics]
+        return {**options, "topics": rows}
+
+
+TYPE: Final = "geometry_msgs/msg/Vector3Stamped"
+
+
+class Step(NamedTuple):
+    """Something that happens."""
+
+    at: float
+    kind: str
+    """A name in tests.simulated.faults."""
+    target: str
+    """A topic, or the name of a group; empty where it is about the relay or all."""
+    seconds: float
+    """How long it lasts."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A world."""
+
+    seed: int
+    sensors: tuple[Sensor, ...]
+    groups: tuple[Group, ...]
+    steps: tuple[Step, ...]
+    length: float
+    """How long it lasts, in seconds; then the relay is asked to end."""
+    hz: float
+    """The moments of the rig in a second."""
+    node: Mapping[str, Any] = field(default_factory=dict)
+    """Keys of the file's section."""
+    eagerness: float = 0.0
+    lag_ms: float = 0.0
+    latency_ms: float = 1.0
+    discovery_ms: float = 100.0
+    watched: bool = False
+    """Whether the relay runs with --watch."""
+
+    @property
+    def by_sim_time(self) -> bool:
+        return bool(self.node.get("use_sim_time"))
+
+    @property
+    def is_managed(self) -> bool:
+        return bool(self.node.get("lifecycle"))
+
+    def sensor(self, topic: str) -> Sensor:
+        return next(each for each in self.sensors if each.topic == topic)
+
+    def described(self) -> str:
+        """Say it in a few lines."""
+        steps = "\n".join(f"  {s.at:7.2f} s  {s.kind} {s.target} for {s.seconds:.2f} s" for s in self.steps)
+        groups = "\n".join(f"  {each.name}: {each.in_file()}" for each in self.groups)
+        sensors = "\n".join(f"  {each}" for each in self.sensors)
+        odd = {
+            key: getattr(self, key) for key in ("node", "eagerness", "lag_ms", "latency_ms", "discovery_ms", "watched")
+        }
+        return f"{self.length:.0f} s at {self.hz:g} Hz, {odd}\n{sensors}\n{groups}\n{steps}"
+
+    def smaller(self) -> Iterator["Plan"]:
+        """Yield plans with a little less in them, the smallest first."""
+        for step in self.steps:
+            yield replace(self, steps=tuple(each for each in self.steps if each is not step))
+        for group in self.groups if len(self.groups) > 1 else ():
+            yield self._without(group)
+        if self.steps:
+            last = max(step.at + step.seconds for step in self.steps)
+            for length in (last + 5, last + HEALED_S / 2, last + HEALED_S + 5):
+                if length < self.length - 1:
+                    yield replace(self, length=length)
+        elif self.length > SETTLED_S:
+            yield replace(self, length=self.length / 2)
+        if self.eagerness or self.lag_ms:
+            yield replace(self, eagerness=0.0, lag_ms=0.0)
+
+    def _without(self, group: Group) -> "Plan":
+        groups = tuple(each for each in self.groups if each is not group)
+        used = {topic for each in groups for topic in each.topics}
+        sensors = tuple(each for each in self.sensors if each.topic in used)
+        gone = {group.name, *(each.topic for each in self.sensors if each.topic not in used)}
+        steps = tuple(each for each in self.steps if each.target not in gone)
+        return replace(self, groups=groups, sensors=sensors, steps=steps)
+
+
+def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
+    """Draw a world. `kinds` says of each kind of step what it is about, and what the world must be like for it."""
+    chance = Random(f"world {seed}")
+    exact = chance.random() < 0.3
+    hz = chance.choice([4.0, 5.0, 8.0, 10.0])
+    # Fast sensors that are out of step would make sets between the moments.
+    every = 1 if exact else chance.choice([1, 2, 3])
+    sensors = tuple(
+        _sensor(chance, number, every=every, exact=exact) for number in range(chance.choice([2, 2, 3, 3, 4]))
+    )
+    groups = tuple(_group(chance, f"g{n}", sensors, exact=exact, hz=hz) for n in range(chance.choice([1, 1, 2, 3])))
+    used = {topic for group in groups for topic in group.topics}
+    sensors = tuple(each for each in sensors if each.topic in used)
+    node: dict[str, Any] = {}
+    if chance.random() < 0.15:
+        node["use_sim_time"] = True
+    if chance.random() < 0.15:
+        node["lifecycle"] = True
+    if chance.random() < 0.1:
+        node["coalesce"] = "5ms"
+    chaotic = chance.random() < 0.35
+    plan = Plan(
+        seed,
+        sensors,
+        groups,
+        (),
+        0.0,
+        hz,
+        node=node,
+        eagerness=chance.choice([0.0, 0.0, 0.1, 0.5]),
+        lag_ms=chance.choice([0.0, 0.0, 20.0]),
+        latency_ms=chance.choice([0.2, 1.0, 10.0]),
+        discovery_ms=chance.choice([20.0, 100.0, 900.0]),
+        watched=chance.random() < 0.3,
+    )
+    steps = tuple(sorted(_steps(chance, plan, kinds, chaotic=chaotic)))
+    last = max((step.at + step.seconds for step in steps), default=SETTLED_S)
+    rest = chance.uniform(0, 20) if chaotic else HEALED_S + 15
+    return replace(plan, steps=steps, length=last + rest)
+
+
+def _sensor(chance: Random, number: int, *, every: int, exact: bool) -> Sensor:
+    return Sensor(
+        topic=f"/s{number}",
+        every=chance.choice([1, every]),
+        wobble=0 if exact else 1 * MS,
+        takes=chance.randrange(1, 30) * MS,
+        reliability=chance.choice(["reliable", "reliable", "best_effort"]),
+        durability=chance.choice(["volatile", "volatile", "transient_local"]),
+        depth=chance.choice([5, 10, 100]),
+    )
+
+
+def _group(chance: Random, name: str, sensors: Sequence[Sensor], *, exact: bool, hz: float) -> Group:
+    chosen = chance.sample(sensors, k=chance.randint(2, len(sensors)))
+    policies = ["approximate_time", "approximate_time_eager", "latest_time", "ticks"]
+    if exact:
+        policies += ["exact_time", "exact_time", "approximate_epsilon_time"]
+    if all(each.every == 1 for each in chosen):
+        policies += ["equal_key", "approximate_epsilon_time"]
+    policy = chance.choice(policies)
+    if policy == "latest_time":
+        chosen.sort(key=lambda each: each.every)
+    options = {"queue_size": chance.choice([10, 20, 30]), **_options(policy, chosen[0].topic, hz)}
+    inputs: dict[str, dict[str, Any]] = {}
+    if policy in ("approximate_time", "exact_time", "latest_time") and len(chosen) > 2 and chance.random() < 0.3:
+        inputs[chosen[-1].topic] = {"required": False}
+        if policy != "latest_time":
+            options["max_wait"] = "300ms"
+    if chance.random() < 0.2:
+        options["lazy"] = True
+    if chance.random() < 0.2:
+        options["manifest"] = False
+    return Group(name, tuple(each.topic for each in chosen), options, inputs)
+
+
+def _options(policy: str, first: str, hz: float) -> dict[str, Any]:
+    match policy:
+        case "exact_time":
+            return {"policy": policy}
+        case "equal_key":
+            return {"policy": policy, "key": "header.frame_id"}
+        case "latest_time":
+            return {"policy": policy, "trigger": first, "max_age": "2s"}
+        case "ticks":
+            return {"policy": "latest_time", "trigger": f"{hz:g} Hz", "max_age": "2s", "max_wait": "50ms"}
+    return {"policy": policy, "slop": "30ms"}
+
+
+def _steps(chance: Random, plan: Plan, kinds: Mapping[str, Sequence[str]], *, chaotic: bool) -> Iterator[Step]:
+    """Draw what happens: one fault after the other, each healed before the next; or, in chaos, all at once."""
+    at = SETTLED_S + chance.uniform(0, 10)
+    fit = [kind for kind, needs in kinds.items() if _fits(plan, needs)]
+    for _ in range(chance.randint(4, 14) if chaotic else chance.choice([1, 1, 2, 3])):
+        kind = chance.choice(fit)
+        target = ""
+        if "sensor" in kinds[kind]:
+            target = chance.choice(plan.sensors).topic
+        elif "group" in kinds[kind]:
+            target = chance.choice(plan.groups).name
+        if chaotic:
+            yield Step(chance.uniform(2, 60), kind, target, chance.choice([0.3, 3.0, chance.uniform(0, 30)]))
+            continue
+        seconds = chance.uniform(NAMED_S + 5, NAMED_S + 25)
+        yield Step(at, kind, target, seconds)
+        at += seconds + HEALED_S + chance.uniform(15, 25)
+
+
+def _fits(plan: Plan, needs: Sequence[str]) -> bool:
+    return (
+        ("sim" not in needs or plan.by_sim_time)
+        and ("real" not in needs or not plan.by_sim_time)
+        and ("managed" not in needs or plan.is_managed)
+        and ("several" not in needs or len(plan.groups) > 1)
+    )

@@ -1,0 +1,334 @@
+"""A world: sensors, a relay and who listens to it, in virtual time, and all that happens to them."""
+
+import json
+import struct
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from syncrelay.config import Config, load
+from syncrelay.config.profile import Profile
+from syncrelay.config.rereading import ConfigFiles
+from syncrelay.relay.relay import Relay
+from syncrelay.relay.running import run, services
+from syncrelay.relay.transitions import Transitions
+from tests.simulated.bus import Bus, Reader, Weather, Writer
+from tests.simulated.node import CLOCK_TYPE, SimulatedBackend, SimulatedNode
+from tests.simulated.plan import TYPE, Plan, Sensor
+from tests.simulated.scheduler import MS, SECOND, Process, Scheduler, SimulatedRuntime
+
+if TYPE_CHECKING:
+    from random import Random
+
+OTHER_TYPE: Final = "geometry_msgs/msg/PointStamped"
+_TICK: Final = 50 * MS
+# Moments begin here, some time before the world does.
+_FIRST: Final = 900 * SECOND
+
+
+class Line(NamedTuple):
+    """A line of the relay's log."""
+
+    at: float
+    level: int
+    text: str
+
+
+def content(stamp: int, frame: str, sensor: int, number: int) -> bytes:
+    """A Vector3Stamped that tells which message it is."""
+    seconds, nanoseconds = divmod(stamp, SECOND)
+    text = frame.encode() + b"\0"
+    head = struct.pack("<iII", seconds, nanoseconds, len(text)) + text
+    return b"\0\1\0\0" + head + bytes(-len(head) % 8) + struct.pack("<3d", sensor, number, -1.5)
+
+
+def identity(payload: bytes) -> tuple[int, int]:
+    """Which sensor's message this is, and which of its."""
+    sensor, number, _ = struct.unpack("<3d", payload[-24:])
+    return int(sensor), int(number)
+
+
+class Driver:
+    """A sensor's driver: a process of its own, which may be started again."""
+
+    def __init__(self, world: "World", sensor: Sensor, index: int) -> None:
+        self.world, self.sensor, self.index = world, sensor, index
+        self.period = round(SECOND / world.plan.hz) // sensor.every
+        self.random = world.scheduler.stream(f"driver {index}")
+        self.is_silent = self.is_twice = self.is_cut = self.is_zero = self.is_halved = False
+        self.shift = 0
+        self.batch = 0
+        self.type, self.reliability = TYPE, sensor.reliability
+        self.dies_in_write = False
+        self._life = 0
+        self._number = 0
+        self.writer: Writer | None = None
+
+    def start(self) -> None:
+        """Join, and publish from the next moment on."""
+        self._life += 1
+        process = Process(self.world.scheduler, f"driver of {self.sensor.topic}")
+        process.clock_offset = self.world.clock_offset
+        self.process = process
+        self.participant = self.world.bus.participant(process)
+        node = self.participant.node(f"driver{self.index}")
+        sensor = self.sensor
+        profile = Profile(depth=sensor.depth, reliability=self.reliability, durability=sensor.durability)
+        self.writer = node.writer(sensor.topic, self.type, profile)
+        now = self.world.scheduler.now
+        self._number = max(self._number, (now - _FIRST) // self.period + 1)
+        self._plan_next(self._life)
+
+    def leave(self) -> None:
+        """Leave in order."""
+        if self.writer is not None:
+            self.writer = None
+            self.participant.leave()
+
+    def die(self) -> None:
+        """Die, as by SIGKILL."""
+        if self.writer is not None:
+            self.writer = None
+            self.participant.kill()
+
+    def _plan_next(self, life: int) -> None:
+        scheduler = self.world.scheduler
+        at = _FIRST + self._number * self.period
+        due = at + self.sensor.takes
+        if self.batch:
+            due = -(-due // self.batch) * self.batch
+        scheduler.at(max(due, scheduler.now), lambda: self._publish(at, life))
+
+    def _publish(self, at: int, life: int) -> None:
+        if self.writer is None or life != self._life:
+            return
+        number = self._number
+        self._number += 1
+        self._plan_next(life)
+        if self.is_silent or (self.is_halved and number % 2):
+            return
+        stamp = self.world.stamp_at(at)
+        if self.sensor.wobble:
+            stamp += int(self.sensor.wobble * self.random.random())
+        stamp = 0 if self.is_zero else max(0, stamp + self.shift)
+        data = content(stamp, f"{number}/{self.sensor.every}", self.index, number)
+        if self.is_cut:
+            data = data[:6]
+        if self.dies_in_write:
+            self.dies_in_write = False
+            writer, self.writer = self.writer, None
+            writer.write(data, dies=True)
+            return
+        self.world.heard_write(self.sensor.topic, number)
+        self.writer.write(data)
+        if self.is_twice:
+            self.writer.write(data)
+
+
+class Witness:
+    """Somebody who subscribes to all outputs."""
+
+    def __init__(self, world: "World", topics: Sequence[str]) -> None:
+        self.world, self.topics = world, topics
+        self.readers: list[Reader] = []
+
+    def start(self) -> None:
+        process = Process(self.world.scheduler, "witness")
+        self.participant = self.world.bus.participant(process)
+        node = self.participant.node("witness")
+        profile = Profile(reliability="best_effort", depth=100)
+        self.readers = [node.reader(topic, TYPE, profile) for topic in self.topics]
+        for reader in self.readers:
+            reader.on_data = reader.queue.clear
+
+    def leave(self) -> None:
+        if self.readers:
+            self.readers = []
+            self.participant.leave()
+
+
+class RelayProcess:
+    """The relay, with what `syncrelay --config` does around it."""
+
+    def __init__(self, world: "World", path: Path) -> None:
+        self.world, self.path = world, path
+        self.process = Process(world.scheduler, "relay")
+        self.process.clock_offset = world.clock_offset
+        self.runtime = SimulatedRuntime(self.process)
+        self.relay: Relay | None = None
+        self.node: SimulatedNode | None = None
+        self.requested = False
+        self.has_ended = False
+        self._wants_reload = False
+        world.scheduler.start("main", self._main, self.process)
+
+    def take_reload(self) -> bool:
+        wanted, self._wants_reload = self._wants_reload, False
+        return wanted
+
+    def hang_up(self) -> None:
+        """Send SIGHUP."""
+        self._wants_reload = True
+        if self.relay is not None:
+            self.relay.wake()
+
+    def end(self) -> None:
+        """Send SIGTERM."""
+        self.requested = True
+        if self.relay is not None:
+            self.relay.wake()
+
+    def _main(self) -> None:
+        runtime, plan = self.runtime, self.world.plan
+        files = ConfigFiles([str(self.path)], watched=plan.watched, runtime=runtime)
+        config = load(str(self.path))
+        self.node = node = SimulatedNode(
+            self.world.bus.participant(self.process), runtime, is_simulated=config.node.use_sim_time
+        )
+        node.refusal = lambda topic: self.world.refusal if topic in self.world.outputs else None
+
+        def managed(relay: Relay) -> Callable[[str], Any]:
+            return Transitions(
+                relay, paths=[str(self.path)], require=_anything, is_stopped=lambda: self.requested, runtime=runtime
+            ).carry_out
+
+        with (
+            Relay(
+                config,
+                node,
+                SimulatedBackend(runtime),
+                config_paths=[str(self.path)],
+                manage=managed if config.node.lifecycle else None,
+                runtime=runtime,
+            ) as relay,
+            files,
+        ):
+            files.call_when_read(relay.wake)
+            relay.offer(services(relay, files, lambda: "it stands", runtime=runtime))
+            self.relay = relay
+            run(relay, files, self, require=_anything)
+            relay.drain()
+            self.world.drained()
+        self.has_ended = True
+
+
+def _anything(_: Config) -> None:
+    """Any file will do."""
+
+
+class World:
+    """All of it, as a plan has it."""
+
+    def __init__(self, plan: Plan, folder: Path) -> None:
+        self.plan = plan
+        self.scheduler = Scheduler(plan.seed, eagerness=plan.eagerness, lag_ns=round(plan.lag_ms * MS))
+        self.began = self.scheduler.now
+        self.clock_offset = self.scheduler.process.clock_offset
+        self.sim_offset = -self.began
+        self.sim_stopped: int | None = None
+        self.random: Random = self.scheduler.stream("world")
+        weather = Weather(discovery=round(plan.discovery_ms * MS), latency=round(plan.latency_ms * MS))
+        self.bus = Bus(self.scheduler, weather)
+        self.outputs = {
+            f"/{group.name}{topic}": (group.name, index)
+            for group in plan.groups
+            for index, topic in enumerate(group.topics)
+        }
+        self.refusal: str | None = None
+        self.path = folder / "fusion.yaml"
+        self.absent: set[str] = set()
+        self.changed: dict[str, int] = {}
+        self.drivers = {each.topic: Driver(self, each, index) for index, each in enumerate(plan.sensors)}
+        self.witness = Witness(self, list(self.outputs))
+        self.answers: list[tuple[float, str, Any]] = []
+        self.lines: list[Line] = []
+        self.heard_write: Callable[[str, int], object] = lambda *_: None
+        self.drained: Callable[[], object] = lambda: None
+        self.write_file()
+        self.relay: RelayProcess | None = None
+
+    @property
+    def now(self) -> float:
+        """Seconds since the begin."""
+        return (self.scheduler.now - self.began) / SECOND
+
+    def stamp_at(self, when: int) -> int:
+        """What the rig's clock shows at a monotonic time."""
+        if not self.plan.by_sim_time:
+            return when + self.clock_offset
+        return (when if self.sim_stopped is None else min(when, self.sim_stopped)) + self.sim_offset
+
+    def write_file(self, text: str | None = None) -> None:
+        """Write the relay's file as it is to be now."""
+        groups = {
+            each.name: each.in_file(slop_factor=1 + self.changed.get(each.name, 0))
+            for each in self.plan.groups
+            if each.name not in self.absent
+        }
+        whole = {"version": 1, "node": dict(self.plan.node), "metrics": None, "groups": groups}
+        self.path.write_text(json.dumps(whole) if text is None else text)
+
+    def start(self) -> None:
+        """Have all of it begin, each at a time of its own."""
+        chance = self.random
+        for driver in self.drivers.values():
+            self.scheduler.after(int(chance.uniform(0, 3) * SECOND), driver.start)
+        self.scheduler.after(int(chance.uniform(0, 3) * SECOND), self.witness.start)
+        if self.plan.by_sim_time:
+            self._start_clock()
+        self.scheduler.after(int(chance.uniform(0, 3) * SECOND), self._start_relay)
+
+    def _start_relay(self) -> None:
+        self.relay = RelayProcess(self, self.path)
+        if self.plan.is_managed:
+            self.scheduler.after(2 * SECOND, partial(self.transit, "configure"))
+            self.scheduler.after(4 * SECOND, partial(self.transit, "activate"))
+
+    def _start_clock(self) -> None:
+        process = Process(self.scheduler, "clock")
+        node = self.bus.participant(process).node("simulator")
+        writer = node.writer("/clock", CLOCK_TYPE, Profile(depth=1, reliability="best_effort"))
+
+        def tick() -> None:
+            self.scheduler.after(_TICK, tick)
+            if self.sim_stopped is None:
+                seconds, nanoseconds = divmod(max(0, self.stamp_at(self.scheduler.now)), SECOND)
+                writer.write(b"\0\1\0\0" + struct.pack("<iI", seconds, nanoseconds))
+
+        tick()
+
+    def ask(self, service: str) -> None:
+        """Call a service of the relay."""
+        node = self.relay.node if self.relay is not None else None
+        if node is not None:
+            asked = len(self.answers)
+            self.answers.append((self.now, service, None))
+            node.request(service, lambda answer: self._answered(asked, answer))
+
+    def transit(self, name: str) -> None:
+        """Ask the relay's node for a transition."""
+        node = self.relay.node if self.relay is not None else None
+        if node is not None:
+            asked = len(self.answers)
+            self.answers.append((self.now, name, None))
+            node.transition(name, lambda success: self._answered(asked, success))
+
+    def _answered(self, asked: int, answer: Any) -> None:
+        at, name, _ = self.answers[asked]
+        self.answers[asked] = at, name, answer
+
+    def reload(self) -> None:
+        """Have the relay read its file again, in one of the ways that there are."""
+        if self.relay is None:
+            return
+        if self.random.random() < 0.5:
+            self.relay.hang_up()
+        else:
+            self.ask("reload")
+
+    def set_clock(self, by: int) -> None:
+        """Set this machine's clock."""
+        self.clock_offset += by
+        for participant in self.bus.participants:
+            participant.process.clock_offset += by
