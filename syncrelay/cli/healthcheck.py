@@ -35,6 +35,7 @@ class Heartbeat:
         self._path = path
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW | os.O_CLOEXEC, 0o644)
         self._due = 0
+        self._is_refused = False
 
     def __enter__(self) -> Self:
         return self
@@ -51,7 +52,20 @@ class Heartbeat:
         if now >= self._due:
             self._due = now + _PERIOD_NS
             # A single write of fixed length: a reader sees the old time or the new one, never a mix.
-            os.pwrite(self._file, b"%020d\n" % now, 0)
+            try:
+                os.pwrite(self._file, b"%020d\n" % now, 0)
+            except OSError as error:
+                self._refuse(error)
+            else:
+                self._is_refused = False
+
+    def _refuse(self, error: OSError) -> None:
+        """Say once that the time cannot be written, as on a full disk: the check fails then, and nothing else."""
+        if not self._is_refused:
+            from syncrelay.logs import LOGGER
+
+            self._is_refused = True
+            LOGGER.warning("the heartbeat %s cannot be written: %s; trying again", self._path, error.strerror)
 
 
 def ailment(path: Path) -> str | None:

@@ -169,7 +169,8 @@ class Judge:
 
     def judge(self, facts: GroupFacts) -> tuple[Finding, ...]:
         """Return what is not as usual, an error at least of a silent group; see `with_ok` for what is well."""
-        found = [finding for rule in _CAUSE_RULES for finding in rule.findings(facts)]
+        # Of two publishers whose names are not known yet, the same may be said.
+        found = [*dict.fromkeys(finding for rule in _CAUSE_RULES for finding in rule.findings(facts))]
         self._remember(found, facts)
         may_drift = rules_stamps.may_drift(facts)
         for rule in () if facts.is_new else _MATCHING_RULES:

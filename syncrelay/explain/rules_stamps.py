@@ -175,7 +175,7 @@ def _wait_for_it(facts: GroupFacts, index: int, behind: int) -> str:
 
 def no_common_key(facts: GroupFacts) -> Found:
     """Find that inputs that are matched by key have none in common."""
-    if facts.by_stamp or not facts.is_silent or any(each.key is None for each in facts.inputs):
+    if facts.by_stamp or not facts.is_silent or not facts.had_time or any(each.key is None for each in facts.inputs):
         return
     newest = ", ".join(f"{each.key!r} of {each.name}" for each in facts.inputs)
     yield Fault(

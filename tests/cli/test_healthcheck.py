@@ -1,5 +1,7 @@
 """The sign of life and its probe, told apart from every way in which a relay can be dead."""
 
+import errno
+import itertools
 import os
 import subprocess
 import sys
@@ -37,6 +39,20 @@ def test_what_is_no_beat_of_a_relay_that_turns_is_said(written, ails, tmp_path):
     path = tmp_path / "beat"
     path.write_bytes(written(time.monotonic_ns()).encode(errors="surrogateescape"))
     assert ailment(path) == ails.replace("PATH", str(path))
+
+
+def test_a_full_disk_is_said_once_and_ends_with_it(tmp_path, monkeypatch, caplog):
+    def refuse(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with Heartbeat(tmp_path / "beat", now=itertools.count(0, _SECOND_NS).__next__) as heartbeat:
+        with monkeypatch.context() as patched:
+            patched.setattr(os, "pwrite", refuse)
+            heartbeat.beat()
+            heartbeat.beat()
+        assert caplog.text.count("cannot be written: No space left on device; trying again") == 1
+        heartbeat.beat()
+        assert (tmp_path / "beat").read_text() == f"{2 * _SECOND_NS:020d}\n"
 
 
 def test_nothing_is_left_after_the_end(tmp_path):

@@ -22,10 +22,11 @@ from syncrelay.explain import (
     with_ok,
 )
 from syncrelay.explain.clocks import Drift, Step
+from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.judge import EXPLAINS, explained_by
 from syncrelay.sync import Match, Message
 from syncrelay.sync.messages import DropReason
-from tests.explain.support.cases import LIDAR, camera, dropped, overflowing, wide
+from tests.explain.support.cases import LIDAR, QUIET, camera, dropped, overflowing, wide
 from tests.explain.support.groups import BEGAN, MS, NOW, S, a_group, a_silent_group, an_input
 
 WIDE = wide(*[5] * 40, *[30] * 60)
@@ -51,6 +52,20 @@ def test_what_is_explained_is_not_found_while_its_cause_is():
     slowed = camera(figures=SLOWED)
     assert codes(judge(a_group(slowed, LIDAR, figures=WIDE))) == [Code.SLOWED]
     assert codes(judge(a_group(figures=WIDE))) == [Code.OVER_SLOP]
+
+
+def test_sets_that_were_too_wide_a_while_ago_are_no_finding_while_those_of_now_are_not():
+    assert codes(judge(a_group(figures={**WIDE, "nearest_lately": Distribution([5 * MS] * 20)}))) == []
+
+
+def test_an_input_whose_messages_cannot_be_read_is_not_silent():
+    unread = dropped(DropReason.MALFORMED, 70, **{**QUIET, "fed": 70})
+    assert codes(judge(a_group(unread, LIDAR))) == [Code.MALFORMED]
+
+
+def test_what_is_so_of_two_publishers_that_have_no_names_yet_is_found_once():
+    stranger = Endpoint("a publisher whose node is not known yet", "std_msgs/msg/Int64", is_named=False)
+    assert codes(judge(a_group(camera(publishers=(stranger, stranger)), LIDAR))) == [Code.OTHER_TYPE]
 
 
 def test_an_inactive_node_explains_all_but_what_can_be_mended_before_it_is_active():

@@ -107,7 +107,7 @@ class Writer(Endpoint):
         self.history.append(sample)
         if bus.written is not None:
             bus.written(self, sample)
-        links = [link for link in self.links.values() if link.is_sending]
+        links = [link for link in self.links.values() if link.is_sending] if self.links else []
         if dies:
             links = links[: int(bus.random() * (len(links) + 1))]
         for link in links:
@@ -133,6 +133,8 @@ class Reader(Endpoint):
         """What has not been taken, with the time of its receipt by the system clock of its process."""
         self.lost = 0
         self.on_data = on_data
+        self.is_sink = False
+        """Whether nobody asks what it gets, or when: so nothing is sent."""
         super().__init__(node, topic, type_name, profile)
 
     def take(self) -> tuple[bytes, int] | None:
@@ -178,6 +180,8 @@ class Link:
 
     def send(self, sample: Sample) -> None:
         """Send a message on its way."""
+        if self.reader.is_sink:
+            return
         bus = self.writer.bus
         self.under_way += 1
         if not self.is_receiving or self.reader.participant.process.is_still:

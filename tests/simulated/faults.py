@@ -62,6 +62,8 @@ def is_felt(kind: str, target: str, group: Group, plan: Plan) -> bool:
     """Whether the group must say so: where an input is optional, a message serves again, or others are left, it may."""
     if not KINDS[kind].must or target in group.optional:
         return False
+    if kind == "unstamped" and "key" in group.options:
+        return False
     sensor = next((each for each in plan.sensors if each.topic == target), None)
     if kind in ("halves", "other_clock", "twice"):
         return sensor is not None and sensor.every == 1 and not group.repeats and "key" not in group.options
@@ -165,7 +167,8 @@ def twice(world: World, target: str, _: float) -> End:
     return _set(world, target, is_twice=True)
 
 
-@_kind("sensor", names="bursts short_queue silent slowed waiting_for_optional few_sets out_of_order")
+# Delays that grow and fall with each batch look like a drift where few messages make one: its clock is to be modelled.
+@_kind("sensor", names="bursts short_queue silent slowed waiting_for_optional few_sets out_of_order clock_drift")
 def batches(world: World, target: str, _: float) -> End:
     """Messages are held back, and sent together."""
     return _set(world, target, batch=1500 * MS)
@@ -192,7 +195,7 @@ def second_publisher(world: World, target: str, _: float) -> End:
     return driver.leave
 
 
-@_kind(names="messages_lost slowed silent bursts")
+@_kind(names="messages_lost slowed silent bursts short_queue")
 def loss(world: World, _: str, __: float) -> End:
     """The network loses a third of all messages."""
     weather = world.bus.weather
@@ -277,7 +280,7 @@ def reload_same(world: World, _: str, __: float) -> End:
 @_kind(spoils=False)
 def reload_faulty(world: World, _: str, __: float) -> End:
     """The file is not valid for a while; or it is written in parts."""
-    whole = world.path.read_text()
+    whole = world.file()
     world.write_file(whole[: int(len(whole) * world.random.random())])
     world.reload()
 
@@ -376,4 +379,64 @@ def clock_stops(world: World, _: str, __: float) -> End:
 def clock_loops(world: World, _: str, __: float) -> End:
     """The simulation begins again."""
     world.sim_offset = -world.scheduler.now
+    return None
+
+
+@_kind("sensor", names="slowed bursts")
+def doubles(world: World, target: str, _: float) -> End:
+    """The driver sends every message again, half a period later."""
+    return _set(world, target, is_doubled=True)
+
+
+@_kind(names="few_sets", spoils=False)
+def namesake(world: World, _: str, __: float) -> End:
+    """Another node has the relay's name."""
+    participant = world.bus.participant(Process(world.scheduler, "namesake"))
+    participant.node("syncrelay").reader("/elsewhere/odd", OTHER_TYPE, Profile())
+    return participant.leave
+
+
+@_kind("group", names="refused_by_dds incompatible_qos no_publisher silent")
+def refuse_subscriptions(world: World, target: str, _: float) -> End:
+    """DDS makes nothing more, on any topic, and the group's sensors come back with another reliability."""
+    world.refused_everywhere = "no memory"
+    group = next(each for each in world.plan.groups if each.name == target)
+    topic = group.topics[0]
+    other = "best_effort" if world.drivers[topic].reliability == "reliable" else "reliable"
+    end = _returning(world, topic, reliability=other)
+
+    def relent() -> None:
+        world.refused_everywhere = None
+        end()
+
+    return relent
+
+
+@_kind(spoils=False)
+def file_in_parts(world: World, _: str, __: float) -> End:
+    """The file is written anew in two parts; who watches it waits until it rests."""
+    whole = world.file()
+    world.write_file(whole[: len(whole) // 2])
+    world.scheduler.after(SECOND, world.write_file)
+    return None
+
+
+@_kind(spoils=False)
+def file_gone(world: World, _: str, __: float) -> End:
+    """The file is not there for a while."""
+    world.path.unlink(missing_ok=True)
+    world.reload()
+
+    def back() -> None:
+        world.write_file()
+        world.reload()
+
+    return back
+
+
+@_kind(spoils=False)
+def reload_often(world: World, _: str, __: float) -> End:
+    """Somebody sends SIGHUP and calls ~/reload at once, many times."""
+    for after in range(12):
+        world.scheduler.after(after * 20 * MS, world.reload)
     return None

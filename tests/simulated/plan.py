@@ -151,7 +151,7 @@ def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
     """Draw a world. `kinds` says of each kind of step what it is about, and what the world must be like for it."""
     chance = Random(f"world {seed}")
     exact = chance.random() < 0.3
-    hz = chance.choice([4.0, 5.0, 8.0, 10.0])
+    hz = chance.choice([2.0, 3.0, 4.0, 5.0, 8.0])
     # Fast sensors that are out of step would make sets between the moments.
     every = 1 if exact else chance.choice([1, 2, 3])
     sensors = tuple(
@@ -191,7 +191,7 @@ def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
 def _sensor(chance: Random, number: int, *, every: int, exact: bool) -> Sensor:
     return Sensor(
         topic=f"/s{number}",
-        every=chance.choice([1, every]),
+        every=chance.choice([1, 1, every]),
         wobble=0 if exact else 1 * MS,
         takes=chance.randrange(1, 30) * MS,
         reliability=chance.choice(["reliable", "reliable", "best_effort"]),

@@ -56,7 +56,7 @@ class Driver:
         self.world, self.sensor, self.index = world, sensor, index
         self.period = round(SECOND / world.plan.hz) // sensor.every
         self.random = world.scheduler.stream(f"driver {index}")
-        self.is_silent = self.is_twice = self.is_cut = self.is_zero = self.is_halved = False
+        self.is_silent = self.is_twice = self.is_cut = self.is_zero = self.is_halved = self.is_doubled = False
         self.shift = 0
         self.batch = 0
         self.type, self.reliability = TYPE, sensor.reliability
@@ -124,6 +124,13 @@ class Driver:
         self.writer.write(data)
         if self.is_twice:
             self.writer.write(data)
+        if self.is_doubled:
+            self.world.scheduler.after(self.period // 2, partial(self._write_between, stamp, life))
+
+    def _write_between(self, stamp: int, life: int) -> None:
+        """Write a message of no moment of the rig."""
+        if self.writer is not None and life == self._life:
+            self.writer.write(content(stamp + self.period // 2, "between", self.index, -1))
 
 
 class Witness:
@@ -140,7 +147,7 @@ class Witness:
         profile = Profile(reliability="best_effort", depth=100)
         self.readers = [node.reader(topic, TYPE, profile) for topic in self.topics]
         for reader in self.readers:
-            reader.on_data = reader.queue.clear
+            reader.is_sink = True
 
     def leave(self) -> None:
         if self.readers:
@@ -186,7 +193,7 @@ class RelayProcess:
         self.node = node = SimulatedNode(
             self.world.bus.participant(self.process), runtime, is_simulated=config.node.use_sim_time
         )
-        node.refusal = lambda topic: self.world.refusal if topic in self.world.outputs else None
+        node.refusal = self.world.refused
 
         def managed(relay: Relay) -> Callable[[str], Any]:
             return Transitions(
@@ -236,6 +243,9 @@ class World:
             for index, topic in enumerate(group.topics)
         }
         self.refusal: str | None = None
+        """Why DDS makes nothing on the outputs."""
+        self.refused_everywhere: str | None = None
+        """Why it makes nothing at all."""
         self.path = folder / "fusion.yaml"
         self.absent: set[str] = set()
         self.changed: dict[str, int] = {}
@@ -247,6 +257,10 @@ class World:
         self.drained: Callable[[], object] = lambda: None
         self.write_file()
         self.relay: RelayProcess | None = None
+
+    def refused(self, topic: str) -> str | None:
+        """Return why DDS makes nothing on a topic for the relay."""
+        return self.refused_everywhere or (self.refusal if topic in self.outputs else None)
 
     @property
     def now(self) -> float:
@@ -260,14 +274,17 @@ class World:
         return (when if self.sim_stopped is None else min(when, self.sim_stopped)) + self.sim_offset
 
     def write_file(self, text: str | None = None) -> None:
-        """Write the relay's file as it is to be now."""
+        """Write the relay's file as it is to be now, or a text."""
+        self.path.write_text(self.file() if text is None else text)
+
+    def file(self) -> str:
+        """Return the relay's file as it is to be now."""
         groups = {
             each.name: each.in_file(slop_factor=1 + self.changed.get(each.name, 0))
             for each in self.plan.groups
             if each.name not in self.absent
         }
-        whole = {"version": 1, "node": dict(self.plan.node), "metrics": None, "groups": groups}
-        self.path.write_text(json.dumps(whole) if text is None else text)
+        return json.dumps({"version": 1, "node": dict(self.plan.node), "metrics": None, "groups": groups})
 
     def start(self) -> None:
         """Have all of it begin, each at a time of its own."""
