@@ -75,7 +75,7 @@ class Endpoint:
     def end(self) -> None:
         """End it, in order: others hear of it."""
         self.is_ended = True
-        self.participant.endpoints.discard(self)
+        self.participant.endpoints.pop(self, None)
         self.bus.withdraw(self)
 
 
@@ -269,7 +269,7 @@ class Participant:
         self.bus = bus
         self.process = process
         self.nodes: list[BusNode] = []
-        self.endpoints: set[Endpoint] = set()
+        self.endpoints: dict[Endpoint, None] = {}
         self.found: dict[Endpoint, None] = {}
         """The endpoints that it has found, its own too, in the order in which it did."""
         self.named: dict[BusNode, None] = {}
@@ -292,7 +292,7 @@ class Participant:
         held = next((each.type for each in self.endpoints if each.topic == endpoint.topic), endpoint.type)
         if held != endpoint.type:
             raise RefusedByDdsError(f"topic {endpoint.topic} is {held} in this participant")
-        self.endpoints.add(endpoint)
+        self.endpoints[endpoint] = None
         self.bus.announce(endpoint)
         return endpoint
 

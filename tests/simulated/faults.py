@@ -71,16 +71,16 @@ def is_felt(kind: str, target: str, group: Group, plan: Plan) -> bool:
 
 
 def _set(world: World, target: str, **changes: object) -> Callable[[], None]:
-    """Change a driver; what is returned changes it back."""
+    """Change a driver; what is returned makes it a usual one again, whatever else was changed meanwhile."""
     driver = world.drivers[target]
-    before = {key: getattr(driver, key) for key in changes}
+    usual = driver.usual
 
     def put(values: Mapping[str, object]) -> None:
-        for key, value in values.items():
-            setattr(driver, key, value)
+        for key in changes:
+            setattr(driver, key, values[key])
 
     put(changes)
-    return partial(put, before)
+    return partial(put, usual)
 
 
 def _returning(world: World, target: str, **changes: object) -> Callable[[], None]:
@@ -199,10 +199,10 @@ def second_publisher(world: World, target: str, _: float) -> End:
 def loss(world: World, _: str, __: float) -> End:
     """The network loses a third of all messages."""
     weather = world.bus.weather
-    before, weather.loss = weather.loss, 0.3
+    weather.loss = 0.3
 
     def end() -> None:
-        weather.loss = before
+        weather.loss = 0.0
 
     return end
 
@@ -342,21 +342,18 @@ def nobody_listens(world: World, _: str, __: float) -> End:
 @_kind("managed", names="inactive", must=True)
 def deactivate(world: World, _: str, __: float) -> End:
     """The managed node is deactivated, and activated again."""
+    world.is_to_be_active = False
     world.transit("deactivate")
-    return partial(world.transit, "activate")
+    return world.bring_up
 
 
 @_kind("managed", names="inactive")
 def configure_again(world: World, _: str, __: float) -> End:
     """The managed node is taken back to its first state, by somebody who also asks for what is not possible."""
+    world.is_to_be_active = False
     for name in ("configure", "deactivate", "activate", "deactivate", "cleanup"):
         world.transit(name)
-
-    def back() -> None:
-        world.transit("configure")
-        world.transit("activate")
-
-    return back
+    return world.bring_up
 
 
 @_kind("sim", names="clock_stopped no_clock silent time_jump", must=True)

@@ -40,6 +40,8 @@ class _Recorder(logging.Handler):
         text = record.getMessage()
         if record.exc_info:
             text += "\n" + logging.Formatter().formatException(record.exc_info)
+        # Each play has a folder of its own.
+        text = text.replace(f"{self._world.path.parent}/", "")
         self._world.lines.append(Line(self._world.now, record.levelno, text))
 
 

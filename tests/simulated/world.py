@@ -60,6 +60,7 @@ class Driver:
         self.shift = 0
         self.batch = 0
         self.type, self.reliability = TYPE, sensor.reliability
+        self.usual = dict(vars(self))
         self.dies_in_write = False
         self._life = 0
         self._number = 0
@@ -248,6 +249,7 @@ class World:
         """Why it makes nothing at all."""
         self.path = folder / "fusion.yaml"
         self.absent: set[str] = set()
+        self.is_to_be_active = False
         self.changed: dict[str, int] = {}
         self.drivers = {each.topic: Driver(self, each, index) for index, each in enumerate(plan.sensors)}
         self.witness = Witness(self, list(self.outputs))
@@ -299,8 +301,7 @@ class World:
     def _start_relay(self) -> None:
         self.relay = RelayProcess(self, self.path)
         if self.plan.is_managed:
-            self.scheduler.after(2 * SECOND, partial(self.transit, "configure"))
-            self.scheduler.after(4 * SECOND, partial(self.transit, "activate"))
+            self.scheduler.after(2 * SECOND, self.bring_up)
 
     def _start_clock(self) -> None:
         process = Process(self.scheduler, "clock")
@@ -330,6 +331,18 @@ class World:
             asked = len(self.answers)
             self.answers.append((self.now, name, None))
             node.transition(name, lambda success: self._answered(asked, success))
+
+    def bring_up(self) -> None:
+        """Have a managed node activated, as a lifecycle manager does: again and again until it is."""
+        self.is_to_be_active = True
+        self._manage()
+
+    def _manage(self) -> None:
+        node = self.relay.node if self.relay is not None else None
+        if node is None or not self.is_to_be_active or node.state == "active":
+            return
+        self.transit("configure" if node.state == "unconfigured" else "activate")
+        self.scheduler.after(2 * SECOND, self._manage)
 
     def _answered(self, asked: int, answer: Any) -> None:
         at, name, _ = self.answers[asked]
