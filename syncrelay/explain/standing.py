@@ -125,6 +125,7 @@ class ShareWindow:
         self._least_period = least_period
         self._polls: deque[_Poll] = deque()
         self._is_pausing: dict[int, bool] = {}
+        self._has_clock = False
 
     def clear(self) -> None:
         """Start afresh: a clock was set, or nothing was fed for a while."""
@@ -134,7 +135,9 @@ class ShareWindow:
         self, counts: Sequence[InputCounts], sets: int, paces: Sequence[Pace], *, now: int, clock: int | None = None
     ) -> None:
         """Take the counts as they are now; `clock` is the time by which sets are made, where it is not `now`."""
-        if any(paces[index].first is None for index in self._required):
+        had_clock, self._has_clock = self._has_clock, clock is not None
+        if had_clock is not self._has_clock or any(paces[index].first is None for index in self._required):
+            # Nothing is known to lie between the times of two clocks.
             self._polls.clear()
         elif self._ticks_hz is not None and self._polls and not self._polls[-1].sets:
             # Nothing counts the ticks before the first set, so the window begins with that set.

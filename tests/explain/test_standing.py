@@ -13,6 +13,8 @@ from typing import Any
 import pytest
 
 from syncrelay.explain import Severity, with_ok
+from syncrelay.explain.standing import Pace, ShareWindow
+from syncrelay.sync.counts import InputCounts
 from tests.explain.scenario import BEGAN, S, Source, Told, run
 from tests.faults.extent import IS_LONG
 
@@ -152,3 +154,13 @@ def test_recovered_is_said_once_the_share_is_back(hz):
     # The window of a slow group is longer: it holds 30 possible sets.
     assert 50 + 0.9 * max(10, 30 / hz) < recovered.second <= 51 + max(10, 30 / hz)
     assert changes(told, since=45) == [Severity.ERROR, Severity.WARN, Severity.OK]
+
+
+def test_a_share_is_measured_by_one_clock_alone():
+    """A simulated clock that rests is not asked: the system's is 54 years ahead of it."""
+    window = ShareWindow([0], counted=[0], ticks_hz=4.0)
+    for second in range(20):
+        counts = [InputCounts(second * 4, second * 4, {}, 0)]
+        clock = None if second == 10 else (100 + second) * S
+        window.add(counts, second * 4, [Pace(BEGAN, BEGAN + second * S, S // 4)], now=BEGAN + second * S, clock=clock)
+        assert window.share().possible <= 4 * second
