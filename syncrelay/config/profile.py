@@ -2,23 +2,26 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from syncrelay.config.qos import QosOverrides, QosPreset
 
 UNSET: Final = 0
 """rclpy's default of every duration, which rosbag2 writes too: there is no limit."""
-_BEST_AVAILABLE_NS: Final = 9_223_372_036_854_775_806
+_BEST: Final = "best_available"
+_BEST_NS: Final = 9_223_372_036_854_775_806
 # The DDS history, not queue_size: deep enough for an input of 200 Hz to lose nothing in a stall of half a second.
 _DEPTH: Final = 100
 # Fast DDS keeps as many with keep_all.
 _KEPT: Final = 5000
-# Of each policy, what is less and what is more: a publisher must offer at least what is requested.
+# Of each policy, from the least to the most: a publisher must offer at least what is requested. DDS's liveliness by
+# participant, which ROS has no name for, is the unknown one.
 _RANKS: Final = {
     "reliability": ("best_effort", "reliable"),
     "durability": ("volatile", "transient_local"),
-    "liveliness": ("automatic", "manual_by_topic"),
+    "liveliness": ("automatic", "unknown", "manual_by_topic"),
 }
+_DURATIONS: Final = ("deadline", "liveliness_lease_duration")
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +48,11 @@ PRESETS: Final[Mapping[str, Profile]] = {
     "parameter_events": Profile(depth=1000),
     "action_status_default": Profile(depth=1, durability="transient_local"),
     "best_available": Profile(
-        reliability="best_available",
-        durability="best_available",
-        deadline=_BEST_AVAILABLE_NS,
-        liveliness="best_available",
-        liveliness_lease_duration=_BEST_AVAILABLE_NS,
+        reliability=_BEST,
+        durability=_BEST,
+        deadline=_BEST_NS,
+        liveliness=_BEST,
+        liveliness_lease_duration=_BEST_NS,
     ),
 }
 """The presets that a file can name, as rclpy.qos.QoSPresetProfiles has them."""
@@ -66,25 +69,48 @@ class Mismatch(NamedTuple):
 def matched(asked: QosPreset | QosOverrides, offered: Sequence[Profile]) -> Profile:
     """Return what the file asks for, and for the rest what every publisher can serve.
 
-    It is reliable only if all publishers are, transient_local only if all are.
+    It is reliable only if all publishers are, transient_local only if all are. So it is with every policy that is to
+    be `best_available`.
     """
+    profile = _asked(asked)
+    best: dict[str, Any] = {policy: _most(policy, offered) for policy in _open(profile)}
+    return replace(profile, **best)
+
+
+def _asked(asked: QosPreset | QosOverrides) -> Profile:
     if isinstance(asked, QosPreset):
         return PRESETS[asked.name]
-    served = Profile(
-        depth=_DEPTH,
-        reliability="reliable" if all(each.reliability != "best_effort" for each in offered) else "best_effort",
-        durability="transient_local"
-        if offered and all(each.durability == "transient_local" for each in offered)
-        else "volatile",
-    )
-    return replace(served, **asked.model_dump(exclude_none=True))
+    return replace(Profile(depth=_DEPTH, reliability=_BEST, durability=_BEST), **asked.model_dump(exclude_none=True))
+
+
+def _open(profile: Profile) -> list[str]:
+    """Return the policies that publishers decide.
+
+    rmw would decide them once, as the subscription is made. Without a publisher it takes the most of each, and those
+    that start later and offer less are never heard.
+    """
+    return [policy for policy in (*_RANKS, *_DURATIONS) if getattr(profile, policy) in (_BEST, _BEST_NS)]
+
+
+def _most(policy: str, offered: Sequence[Profile]) -> str | int:
+    """Return the most of a policy that can be requested of every publisher."""
+    values = [getattr(each, policy) for each in offered]
+    if policy in _DURATIONS:
+        return UNSET if UNSET in values else max(values, default=UNSET)
+    if policy == "reliability":
+        return "best_effort" if "best_effort" in values else "reliable"
+    least, *_, most = _RANKS[policy]
+    return most if values and all(value == most for value in values) else least
+
+
+def _reaches(policy: str, offer: str, request: str) -> bool:
+    ranks = _RANKS[policy]
+    return not (offer in ranks and request in ranks and ranks.index(offer) < ranks.index(request))
 
 
 def is_known(asked: QosPreset | QosOverrides, offered: Sequence[Profile]) -> bool:
     """Whether `matched` needs no more than there is: without publishers, only if the file says all that they decide."""
-    if offered or isinstance(asked, QosPreset):
-        return True
-    return asked.reliability is not None and asked.durability is not None
+    return bool(offered) or not _open(_asked(asked))
 
 
 def sent(received: Profile) -> Profile:
@@ -101,11 +127,12 @@ def mismatch(offered: Profile, requested: Profile) -> Mismatch | None:
 
     The rules are those of DDS 1.4, section 2.2.3.
     """
-    for policy, (less, more) in _RANKS.items():
-        if getattr(offered, policy) == less and getattr(requested, policy) == more:
-            return Mismatch(policy, less, more)
-    for policy in ("deadline", "liveliness_lease_duration"):
+    for policy in _RANKS:
         offer, request = getattr(offered, policy), getattr(requested, policy)
-        if request and request != _BEST_AVAILABLE_NS and (not offer or offer > request):
+        if not _reaches(policy, offer, request):
+            return Mismatch(policy, offer, request)
+    for policy in _DURATIONS:
+        offer, request = getattr(offered, policy), getattr(requested, policy)
+        if request and (not offer or offer > request):
             return Mismatch(policy, f"{offer / 1e6:g}ms" if offer else "none", f"{request / 1e6:g}ms")
     return None

@@ -36,15 +36,19 @@ def _endpoints(
 ) -> tuple[Endpoint, ...]:
     return tuple(
         Endpoint(
-            full_name(info.node_name, info.node_namespace)
-            if info.is_named
-            else f"a {kind} whose node is not known yet",
+            _owner(info, kind),
             printable(info.type),
             why(info.profile),
             is_named=info.is_named,
         )
         for info in infos
     )
+
+
+def _owner(info: EndpointInfo, kind: str) -> str:
+    if not info.uses_ros:
+        return f"a {kind} that uses DDS without ROS"
+    return full_name(info.node_name, info.node_namespace) if info.is_named else f"a {kind} whose node is not known yet"
 
 
 def others(infos: Iterable[EndpointInfo], *, than: str, own: int) -> tuple[Endpoint, ...]:

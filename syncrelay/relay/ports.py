@@ -33,7 +33,9 @@ class EndpointInfo(NamedTuple):
     type: str
     profile: Profile
     is_named: bool = True
-    """Whether the message that names its node has arrived."""
+    """Whether the message that names its node has arrived, or none will come."""
+    uses_ros: bool = True
+    """Whether it belongs to a node; what uses DDS alone has no name."""
 
 
 class NodeName(NamedTuple):

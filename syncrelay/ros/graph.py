@@ -12,6 +12,8 @@ from syncrelay.ros.qos import from_rclpy
 
 # rmw_dds_common gives this name to a node whose own name has not arrived.
 _NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
+# And this to what no node of ROS has made.
+_WITHOUT_ROS: Final = "_CREATED_BY_BARE_DDS_APP_"
 
 
 class RosGraph:
@@ -62,5 +64,11 @@ def _asked(ask: Callable[[str, str], Sequence[tuple[str, Sequence[str]]]], node:
 
 
 def _info(raw: Any) -> EndpointInfo:
-    is_named = raw.node_name != _NAMELESS
-    return EndpointInfo(raw.node_name, raw.node_namespace, raw.topic_type, from_rclpy(raw.qos_profile), is_named)
+    return EndpointInfo(
+        raw.node_name,
+        raw.node_namespace,
+        raw.topic_type,
+        from_rclpy(raw.qos_profile),
+        is_named=raw.node_name != _NAMELESS,
+        uses_ros=raw.node_name != _WITHOUT_ROS,
+    )

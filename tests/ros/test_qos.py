@@ -1,5 +1,6 @@
 """QoS: matched to the publishers, or as the file says."""
 
+from dataclasses import replace
 from itertools import combinations_with_replacement, count
 
 import pytest
@@ -43,12 +44,39 @@ def test_auto_takes_the_most_that_all_publishers_offer():
         (QosPreset("sensor_data"), "best_effort", "volatile"),
         (QosOverrides(reliability="best_effort"), "best_effort", "transient_local"),
         (QosOverrides(durability="volatile"), "reliable", "volatile"),
+        (QosPreset("best_available"), "reliable", "transient_local"),
+        (QosOverrides(reliability="best_available"), "reliable", "transient_local"),
     ],
-    ids=["a preset", "only reliability", "only durability"],
+    ids=["a preset", "only reliability", "only durability", "the best", "the best reliability"],
 )
 def test_what_the_file_says_overrides_what_the_publishers_offer(asked, reliability, durability):
     profile = matched(asked, _KINDS[:1])
     assert (profile.reliability, profile.durability) == (reliability, durability)
+
+
+_BEST = QosPreset("best_available")
+
+
+@pytest.mark.parametrize(
+    ("policy", "offers", "best"),
+    [
+        ("reliability", ["reliable", "best_effort"], "best_effort"),
+        ("durability", ["transient_local", "volatile"], "volatile"),
+        ("liveliness", ["manual_by_topic", "manual_by_topic"], "manual_by_topic"),
+        ("liveliness", ["manual_by_topic", "automatic"], "automatic"),
+        ("liveliness", ["manual_by_topic", "unknown"], "automatic"),
+        ("deadline", [5 * MS, 9 * MS], 9 * MS),
+        ("deadline", [5 * MS, 0], 0),
+        ("liveliness_lease_duration", [5 * MS, 9 * MS], 9 * MS),
+    ],
+)
+def test_best_available_is_the_most_that_all_publishers_offer_and_waits_for_them(policy, offers, best):
+    offered = [replace(Profile(), **{policy: offer}) for offer in offers]
+    profile = matched(_BEST, offered)
+    assert getattr(profile, policy) == best
+    assert not any(mismatch(each, profile) for each in offered)
+    assert not is_known(_BEST, [])
+    assert not is_known(QosOverrides(reliability="reliable", durability="volatile", liveliness="best_available"), [])
 
 
 def test_an_output_of_an_input_that_keeps_all_keeps_the_last_5000():
