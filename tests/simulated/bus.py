@@ -8,7 +8,7 @@ stays in the graph until its lease ends. All times are in nanoseconds.
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final, NamedTuple
 
@@ -62,7 +62,8 @@ class Endpoint:
         self.bus = node.participant.bus
         self.topic = topic
         self.type = type_name
-        self.profile = profile
+        # Observed: nothing is said of liveliness, and it is automatic.
+        self.profile = replace(profile, liveliness="automatic") if profile.liveliness == "system_default" else profile
         self.is_ended = False
         self.links: dict[Endpoint, Link] = {}
         """By the other end: what is connected, or about to be."""
@@ -137,6 +138,11 @@ class Reader(Endpoint):
         """Whether nobody asks what it gets, or when: so nothing is sent."""
         super().__init__(node, topic, type_name, profile)
 
+    @property
+    def n_writers(self) -> int:
+        """How many writers it has found that serve it."""
+        return sum(link.is_receiving for link in self.links.values())
+
     def take(self) -> tuple[bytes, int] | None:
         """Take the oldest message, and when it was received."""
         lifespan = self.profile.lifespan
@@ -148,7 +154,12 @@ class Reader(Endpoint):
 
 
 class Link:
-    """A writer and a reader that fit."""
+    """A writer and a reader that fit.
+
+    Observed: each finds the other for itself, up to a second apart. What a reliable writer sends in between arrives,
+    to volatile readers too; by best effort it is lost. A message of 0 bytes never arrives: by best effort the next ones
+    do; a reliable reader gets nothing more until the writer's history has dropped that message, and then all it holds.
+    """
 
     def __init__(self, writer: Writer, reader: Reader) -> None:
         self.writer, self.reader = writer, reader
@@ -161,6 +172,10 @@ class Link:
         """What was sent before the reader had found the writer, or while its process stood still."""
         self.last = 0
         self.under_way = 0
+        self.empty: Sample | None = None
+        """A message of 0 bytes for which a reliable reader waits."""
+        self.behind: list[Sample] = []
+        """What was sent after that."""
         self.expected: int | None = None
 
     def found_by_writer(self) -> None:
@@ -180,7 +195,7 @@ class Link:
 
     def send(self, sample: Sample) -> None:
         """Send a message on its way."""
-        if self.reader.is_sink:
+        if self.reader.is_sink or not self._may_pass(sample):
             return
         bus = self.writer.bus
         self.under_way += 1
@@ -196,6 +211,19 @@ class Link:
             when += int(_HEARTBEAT * bus.random() ** 4) + MS
         self.last = when = max(when, self.last)
         bus.scheduler.at(when, lambda: self._arrive(sample, resent=resent))
+
+    def _may_pass(self, sample: Sample) -> bool:
+        if self.empty is not None and not self.writer.holds(self.empty):
+            behind, self.behind, self.empty = self.behind, [], None
+            for each in behind:
+                self.send(each)
+        if self.empty is None and sample.content:
+            return True
+        if self.empty is not None:
+            self.behind.append(sample)
+        elif self.is_reliable:
+            self.empty = sample
+        return False
 
     def _send_waiting(self) -> None:
         waiting, self.waiting = self.waiting, []
@@ -281,7 +309,7 @@ class Participant:
 
     def node(self, name: str, namespace: str = "/") -> BusNode:
         """Make a node."""
-        made = BusNode(self, name, namespace)
+        made = BusNode(self, name, namespace or "/")
         self.nodes.append(made)
         self.bus.announce_node(made)
         return made
@@ -291,7 +319,12 @@ class Participant:
         self.bus.may_make(endpoint)
         held = next((each.type for each in self.endpoints if each.topic == endpoint.topic), endpoint.type)
         if held != endpoint.type:
-            raise RefusedByDdsError(f"topic {endpoint.topic} is {held} in this participant")
+            kind = "publisher" if endpoint.is_writer else "subscription"
+            # The words of rmw_fastrtps, which rcl passes on.
+            raise RefusedByDdsError(
+                f"Failed to create {kind}: create_{kind}() called for existing topic name rt{endpoint.topic}"
+                f" with incompatible type {endpoint.type.replace('/', '::').replace('::msg::', '::msg::dds_::')}_"
+            )
         self.endpoints[endpoint] = None
         self.bus.announce(endpoint)
         return endpoint

@@ -3,6 +3,7 @@
 import logging
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -21,6 +22,7 @@ from tests.simulated.scheduler import MS, SECOND, SimulatedRuntime
 if TYPE_CHECKING:
     from concurrent.futures import Future
 
+_LOG: Final = logging.getLogger("syncrelay")
 _NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
 CLOCK_TYPE: Final = "rosgraph_msgs/msg/Clock"
 _OF_EVERY_NODE: Final = {"/rosout": "rcl_interfaces/msg/Log", "/parameter_events": "rcl_interfaces/msg/ParameterEvent"}
@@ -75,9 +77,11 @@ class SimulatedGraph:
         }
 
     def _info(self, each: Any) -> EndpointInfo:
+        # Observed: the graph does not tell histories.
+        profile = replace(each.profile, history="unknown", depth=0)
         if each.node in self._participant.named:
-            return EndpointInfo(each.node.name, each.node.namespace, each.type, each.profile)
-        return EndpointInfo(_NAMELESS, _NAMELESS, each.type, each.profile, is_named=False)
+            return EndpointInfo(each.node.name, each.node.namespace, each.type, profile)
+        return EndpointInfo(_NAMELESS, _NAMELESS, each.type, profile, is_named=False)
 
 
 class SimulatedSubscription:
@@ -151,12 +155,12 @@ class SimulatedNode:
         self.refusal: Callable[[str], str | None] = lambda _: None
         """Why DDS makes nothing on a topic, in the way of a fault."""
         self.publishers: list[SimulatedPublisher] = []
-        self._remaps = dict(remaps or {})
+        self._remaps = {self._expanded(old): self._expanded(new) for old, new in (remaps or {}).items()}
         self._carry_out: Callable[[str], Outcome] | None = None
         self._offered: dict[str, Call] = {}
         self._due: deque[Callable[[], object]] = deque()
         self._served = runtime.rest()
-        self._ends = self._has_left = False
+        self._ends = self._has_left = self._has_said_below_0 = False
         self._time = 0
         self._follower: Callable[[int], None] | None = None
         self._own = [self.node.writer(topic, of, Profile(depth=1000)) for topic, of in _OF_EVERY_NODE.items()]
@@ -183,12 +187,13 @@ class SimulatedNode:
         return self._resolved(name)
 
     def _resolved(self, name: str) -> str:
-        full = name
-        if name.startswith("~/"):
-            full = f"{self.name}{name[1:]}"
-        elif not name.startswith("/"):
-            full = f"{self.node.namespace.rstrip('/')}/{name}"
+        full = self._expanded(name)
         return self._remaps.get(full, full)
+
+    def _expanded(self, name: str) -> str:
+        if name.startswith("~/"):
+            return f"{self.name}{name[1:]}"
+        return name if name.startswith("/") else f"{self.node.namespace.rstrip('/')}/{name}"
 
     def own(self) -> Sequence[tuple[str, Any, str]]:
         return [(each.topic, each, each.type) for each in self._own]
@@ -242,6 +247,7 @@ class SimulatedNode:
         """Carry out a transition as rclpy does; whether it succeeded."""
         goal = _TRANSITIONS[name].get(self.state)
         if goal is None or self._carry_out is None:
+            _LOG.warning("refused the transition %s: the node is %s", name, self.state)
             return False
         outcome = self._carry_out(name)
         if outcome is Outcome.SUCCESS:
@@ -263,7 +269,14 @@ class SimulatedNode:
             return
         # A Time stands where a Header's stamp does.
         now = read_stamp(taken[0])
-        if now is None or now < 0:
+        if now is None:
+            return
+        if now < 0:
+            # As the relay's adapter to rclpy says it.
+            if not self._has_said_below_0:
+                self._has_said_below_0 = True
+                seconds = now // SECOND
+                _LOG.warning("/clock is at %d s, and no time in ROS is below 0: ignored until it is 0 or more", seconds)
             return
         change, self._time = now - self._time, now
         if self._follower is not None and (change > 0 or change <= _JUMP):

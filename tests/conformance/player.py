@@ -1,0 +1,576 @@
+"""Plays a script in a ROS, real or simulated, and notes what a user can see."""
+
+import json
+import logging
+import re
+import struct
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+from syncrelay.config import load
+from syncrelay.config.profile import Profile
+from syncrelay.config.rereading import ConfigFiles
+from syncrelay.explain.judge import explanation
+from syncrelay.relay.ports import EndpointInfo, Graph, Node, Outcome
+from syncrelay.relay.relay import Relay
+from syncrelay.relay.running import run, services
+from syncrelay.relay.transitions import Transitions
+from syncrelay.runtime import Runtime
+from syncrelay.status import status_of
+from syncrelay.top.plain import summary
+from tests.conformance.script import VECTOR, Script
+from tests.ros.cdr_messages import vector
+
+_LOG: Final = logging.getLogger("syncrelay")
+_MS: Final = 1_000_000
+# Whether a node's name comes before its publishers; and what is said again and again where a script takes long.
+_BY_CHANCE: Final = re.compile("not known yet|no (more )?sets? for ")
+# In the sources of ROS.
+_PLACE: Final = re.compile(r", at [^ ,]+:\d+")
+# With its unit, which goes by the size of a duration.
+_NUMBER: Final = re.compile(r"\d+(\.\d+)?( (ns|us|ms|s)\b)?")
+
+
+class Writer(Protocol):
+    """A publisher of bytes."""
+
+    @property
+    def n_readers(self) -> int:
+        """How many subscribers it serves."""
+        ...
+
+    def write(self, content: bytes) -> None:
+        """Publish."""
+        ...
+
+    def end(self) -> None:
+        """End it, in order."""
+        ...
+
+
+class Reader(Protocol):
+    """A subscriber, which keeps what its history holds until that is taken."""
+
+    @property
+    def n_writers(self) -> int:
+        """How many publishers serve it, as it knows."""
+        ...
+
+    def take(self) -> bytes | None:
+        """Take the oldest message."""
+        ...
+
+    def end(self) -> None:
+        """End it, in order."""
+        ...
+
+
+class World(Protocol):
+    """A ROS. `by` names a process: who shares one shares a participant."""
+
+    @property
+    def runtime(self) -> Runtime:
+        """The clocks and threads of the relay's process."""
+        ...
+
+    @property
+    def graph(self) -> Graph:
+        """The graph, as somebody sees it who has nothing else to do."""
+        ...
+
+    def writer(self, topic: str, type_name: str, profile: Profile, *, by: str, node: str) -> Writer:
+        """Make a publisher."""
+        ...
+
+    def reader(self, topic: str, type_name: str, profile: Profile, *, by: str, node: str) -> Reader:
+        """Make a subscriber."""
+        ...
+
+    def leave(self, by: str) -> None:
+        """Have a process end in order."""
+        ...
+
+    def kill(self, by: str) -> None:
+        """Have a process end by SIGKILL."""
+        ...
+
+    def join(self, config: Any, names: Mapping[str, str]) -> tuple[Any, Any]:
+        """Have the relay's node join, with these remaps; the node and its backend."""
+        ...
+
+    def hold(self, node: Any, topic: str, type_name: str) -> None:
+        """Have the relay's own process publish on a topic."""
+        ...
+
+    def wait_until(self, condition: Callable[[], object], what: str) -> None:
+        """Go on once something holds; raises where it never does."""
+        ...
+
+    def call(self, node: Node, service: str) -> tuple[bool, str]:
+        """Call a service below the relay's name."""
+        ...
+
+    def transition(self, node: Node, name: str) -> tuple[bool, str]:
+        """Ask the relay's node for a transition; whether that succeeded, and its state."""
+        ...
+
+
+@dataclass
+class Seen:
+    """What a user could see."""
+
+    outputs: dict[str, list[str]] = field(default_factory=dict)
+    """Of each subscriber: its messages, by time and frame."""
+    notes: list[Any] = field(default_factory=list)
+    """What was asked for, in the order of the script."""
+    log: list[str] = field(default_factory=list)
+    """The warnings and errors of the relay."""
+
+
+class _Running:
+    """The relay and its main thread, as `syncrelay --config` has it."""
+
+    def __init__(self, world: World, path: Path, names: Mapping[str, str]) -> None:
+        self.world, self.path, self.names = world, path, names
+        self.requested = self.has_ended = self._wants_reload = False
+        self.relay: Relay | None = None
+        self.error: BaseException | None = None
+
+    def take_reload(self) -> bool:
+        wanted, self._wants_reload = self._wants_reload, False
+        return wanted
+
+    def hang_up(self) -> None:
+        self._wants_reload = True
+        if self.relay is not None:
+            self.relay.wake()
+
+    def end(self) -> None:
+        self.requested = True
+        if self.relay is not None:
+            self.relay.wake()
+
+    def main(self) -> None:
+        try:
+            self._main()
+        except Exception as error:  # noqa: BLE001  raised where the test waits
+            self.error = error
+        self.has_ended = True
+
+    def _main(self) -> None:
+        runtime, paths = self.world.runtime, [str(self.path)]
+        files = ConfigFiles(paths, watched=False, runtime=runtime)
+        config = load(*paths)
+        node, backend = self.world.join(config, self.names)
+
+        def managed(relay: Relay) -> Callable[[str], Outcome]:
+            is_stopped = lambda: self.requested  # noqa: E731
+            return Transitions(relay, paths=paths, require=_anything, is_stopped=is_stopped, runtime=runtime).carry_out
+
+        manage = managed if config.node.lifecycle else None
+        with Relay(config, node, backend, config_paths=paths, manage=manage, runtime=runtime) as relay, files:
+            files.call_when_read(relay.wake)
+            relay.offer(services(relay, files, lambda: summary(status_of(relay.state())), runtime=runtime))
+            self.relay = relay
+            run(relay, files, self, require=_anything)
+            relay.drain()
+
+
+def _anything(_: object) -> None:
+    """Any file will do."""
+
+
+class _Recorder(logging.Handler):
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.texts: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        text = record.getMessage()
+        self.texts.append(text if not record.exc_info else f"{text}\n{record.exc_info[1]!r}")
+
+
+class Player:
+    """The verbs of scripts. Times in scripts are milliseconds from the script's begin."""
+
+    def __init__(self, world: World, folder: Path) -> None:
+        self._world, self._folder = world, folder
+        self._begin = world.runtime.time_ns()
+        self._writers: dict[str, tuple[Writer, str]] = {}
+        self._readers: dict[str, Reader] = {}
+        self._running: _Running | None = None
+        self.seen = Seen()
+
+    def publisher(
+        self,
+        topic: str,
+        *,
+        of: str = VECTOR,
+        by: str = "rig",
+        node: str = "",
+        name: str = "",
+        **qos: Any,
+    ) -> None:
+        """Somebody publishes; `name` is for those that share a topic."""
+        writer = self._world.writer(topic, of, Profile(**qos), by=by, node=node or by)
+        self._writers[name or topic] = writer, topic
+
+    def subscriber(
+        self,
+        topic: str,
+        *,
+        of: str = VECTOR,
+        by: str = "ears",
+        node: str = "",
+        name: str = "",
+        **qos: Any,
+    ) -> None:
+        """Somebody subscribes, with a history of 1000 unless told otherwise."""
+        profile = Profile(**{"depth": 1000, **qos})
+        self._readers[name or topic] = self._world.reader(topic, of, profile, by=by, node=node or by)
+        self.seen.outputs[name or topic] = []
+
+    def relay(
+        self,
+        groups: Mapping[str, Any],
+        *,
+        node: Mapping[str, Any] | None = None,
+        names: Mapping[str, str] | None = None,
+    ) -> None:
+        """The relay starts; `names` are remaps."""
+        self._path = self._folder / "fusion.yaml"
+        self._node_keys = node or {}
+        self.file(groups)
+        self._running = running = _Running(self._world, self._path, names or {})
+        self._world.runtime.start("relay", running.main)
+        self._until(lambda: running.relay is not None or running.error, "the relay")
+
+    def file(self, groups: Mapping[str, Any], *, node: Mapping[str, Any] | None = None) -> None:
+        """The relay's file is written."""
+        keys = {**self._node_keys, **(node or {})}
+        self.text(json.dumps({"version": 1, "node": keys, "metrics": None, "groups": groups}))
+
+    def text(self, text: str) -> None:
+        """The relay's file holds this."""
+        self._path.write_text(text)
+
+    def ready(self, *names: str) -> None:
+        """All publishers and subscribers, or these, are connected with the relay, or somebody, in both directions."""
+        for name in names or (*self._writers, *self._readers):
+            self._until(partial(self._is_connected, name), f"somebody on the other side of {name}")
+
+    def served(self, name: str, readers: int) -> None:
+        """A publisher has this many subscribers."""
+        self._until(lambda: self._writers[name][0].n_readers == readers, f"{readers} subscribers of {name}")
+
+    def write(self, name: str, *stamps: float, frame: str = "", data: bytes | None = None) -> None:
+        """A publisher publishes vectors with these stamps, or bytes."""
+        for stamp in stamps:
+            content = vector(self._begin + round(stamp * _MS), frame_id=frame or name) if data is None else data
+            self._writers[name][0].write(content)
+
+    def absolute(self, name: str, *stamps: int) -> None:
+        """A publisher publishes vectors with stamps since 1970, in nanoseconds."""
+        for stamp in stamps:
+            self._writers[name][0].write(vector(stamp, frame_id=name))
+
+    def feed(self, name: str, *stamps: float, frame: str = "", data: bytes | None = None) -> None:
+        """As `write`, one after the other: each once the relay has had the one before."""
+        for stamp in stamps:
+            count = self._fed(name) + 1
+            self.write(name, stamp, frame=frame, data=data)
+            self.fed(name, count)
+
+    def sets(self, *stamps: float, of: tuple[str, ...] = ("/a", "/b"), frame: str = "") -> None:
+        """All of these publish a message of each stamp, one after the other."""
+        for stamp in stamps:
+            for name in of:
+                self.feed(name, stamp, frame=frame)
+
+    def clock(self, *seconds: float) -> None:
+        """The publisher of /clock publishes these times, each once the relay's clock shows the one before."""
+        for each in seconds:
+            now = round(each * 1e9)
+            content = b"\0\1\0\0" + struct.pack("<iI", *divmod(now, 10**9))
+
+            def shows(now: int = now, content: bytes = content) -> bool:
+                # By best effort: what comes before the relay has found the publisher is lost.
+                self.write("/clock", 0, data=content)
+                return self._relay.node.ros_time_ns() == now
+
+            self._until(shows, f"the clock at {each}")
+
+    def fed(self, name: str, count: int) -> None:
+        """The relay has had so many messages of a topic."""
+        self._until(lambda: self._fed(name) >= count, f"message {count} of {name}")
+
+    def out(self, name: str, count: int) -> None:
+        """A subscriber has so many messages."""
+        self._until(lambda: self._taken(name) >= count, f"message {count} on {name}")
+
+    def take(self, name: str) -> None:
+        """A subscriber takes what its history holds."""
+        self._taken(name)
+
+    def mark(self, name: str) -> None:
+        """What a subscriber has got so far is noted."""
+        self._note(name, *self.seen.outputs[name])
+
+    def sleep(self, seconds: float) -> None:
+        """Time passes, of which nothing is to be heard."""
+        self._world.runtime.sleep(seconds)
+
+    def end(self, name: str) -> None:
+        """A publisher or subscriber ends."""
+        (self._writers.pop(name)[0] if name in self._writers else self._readers.pop(name)).end()
+
+    def leave(self, by: str, *names: str) -> None:
+        """A process with these publishers and subscribers ends in order."""
+        self._forget(names)
+        self._world.leave(by)
+
+    def kill(self, by: str, *names: str) -> None:
+        """A process with these publishers is killed."""
+        self._forget(names)
+        self._world.kill(by)
+
+    def hold(self, topic: str, of: str) -> None:
+        """A part of the relay's process that is not ours publishes on a topic."""
+        self._world.hold(self._relay.node, topic, of)
+
+    def finding(self, code: str, name: str = "front", *, naming: str = "", wordless: bool = False) -> None:
+        """What explains most of a group's state is this, and names somebody; its words are noted."""
+        found: list[Any] = []
+
+        def is_found() -> bool:
+            for report in self._reports():
+                if report.facts.name == name:
+                    found[:] = [explanation(report.findings)]
+            # A node's name may come later than its publishers.
+            return bool(found) and found[0].code.value == code and naming in f"{found[0].text} {found[0].suggestion}"
+
+        self._until(is_found, f"the finding {code} of {name}", lambda: found)
+        words = () if wordless else (self._blank(found[0].text), self._blank(found[0].suggestion or ""))
+        self._note(code, *words)
+
+    def counts(self, name: str = "front", *, buffered: int | None = None) -> None:
+        """Where the messages of a group's inputs went is noted, once so many are buffered in all."""
+        noted: list[Any] = []
+
+        def is_so() -> bool:
+            inputs = next((each.facts.inputs for each in self._reports() if each.facts.name == name), ())
+            noted[:] = [
+                (each.name, each.counts.fed, each.counts.matched, each.counts.buffered, _by_reason(each.counts.dropped))
+                for each in inputs
+            ]
+            return bool(inputs) and buffered in (None, sum(each[3] for each in noted))
+
+        self._until(is_so, f"{buffered} buffered messages", lambda: noted)
+        self._note("counts", *noted)
+
+    def dropped(self, reason: str, count: int, name: str = "front") -> None:
+        """So many messages of a group were dropped for a reason."""
+
+        def is_so() -> bool:
+            inputs = next((each.facts.inputs for each in self._reports() if each.facts.name == name), ())
+            return sum(_by_reason(each.counts.dropped).get(reason, 0) for each in inputs) >= count
+
+        self._until(is_so, f"{count} dropped as {reason}")
+
+    def endpoints(
+        self,
+        topic: str,
+        *,
+        publishers: int | None = None,
+        subscribers: int | None = None,
+        reliability: str = "",
+        named: bool = False,
+    ) -> None:
+        """Who publishes and subscribes to a topic, with what QoS, is noted once there are so many.
+
+        So it is once the publishers are of this reliability; and with `named`, once the names of the nodes have come,
+        which may take 3 s.
+        """
+        wanted, graph = (publishers, subscribers), self._world.graph
+
+        def found() -> tuple[Sequence[EndpointInfo], ...]:
+            return graph.publishers_of(topic), graph.subscribers_of(topic)
+
+        def are_there() -> bool:
+            offered = [each.profile.reliability for each in found()[0]]
+            return (
+                all(number in (None, len(each)) for number, each in zip(wanted, found(), strict=True))
+                and (not named or all(each.is_named for kind in found() for each in kind))
+                and (not reliability or all(each == reliability for each in offered))
+            )
+
+        self._until(are_there, f"{publishers} publishers and {subscribers} subscribers of {topic}", found)
+        told = [
+            sorted((_name(each) if named else "", each.type, *_unlike(each.profile)) for each in kind)
+            for kind, number in zip(found(), wanted, strict=True)
+            if number is not None
+        ]
+        self._note(topic, *told)
+
+    def call(self, service: str) -> None:
+        """A service is called, and its answer noted."""
+        success, words = self._world.call(self._relay.node, service)
+        self._note(service, success, self._blank(words))
+
+    def transit(self, *names: str) -> None:
+        """The node is asked for transitions, one after the other."""
+        for name in names:
+            self._note(name, *self._world.transition(self._relay.node, name))
+
+    def hang_up(self, *, reloads: int = 0, refused: int = 0) -> None:
+        """The relay gets SIGHUP, and has then reloaded, or refused to, so many times."""
+        self._require.hang_up()
+        self._until(
+            lambda: (self._relay.state().reloads, self._relay.state().refused_reloads) == (reloads, refused),
+            "the file to be read again",
+        )
+        self._note("reload error", self._blank(self._relay.state().reload_error or ""))
+
+    def phase(self, phase: str) -> None:
+        """The relay is in this phase."""
+        self._until(lambda: self._reports() is not None and self._relay.state().phase.value == phase, f"phase {phase}")
+
+    def stop(self) -> None:
+        """The relay gets SIGTERM, and ends."""
+        running, self._running = self._require, None
+        running.end()
+        self._until(lambda: running.has_ended, "the end of the relay")
+        if running.error is not None:
+            self._note(type(running.error).__name__, self._blank(str(running.error)))
+        relay = running.relay
+        for report in relay.monitor.reports if relay is not None else ():
+            self._note(
+                "at the end",
+                report.facts.name,
+                [
+                    (each.name, each.counts.fed, each.counts.matched, _by_reason(each.counts.dropped))
+                    for each in report.facts.inputs
+                ],
+            )
+
+    def conclude(self) -> None:
+        """End what runs, and take the last messages."""
+        if self._running is not None:
+            self.stop()
+        for name in self._readers:
+            self._taken(name)
+
+    @property
+    def _require(self) -> _Running:
+        assert self._running is not None
+        if self._running.error is not None:
+            raise self._running.error
+        return self._running
+
+    @property
+    def _relay(self) -> Relay:
+        relay = self._require.relay
+        assert relay is not None
+        return relay
+
+    def _reports(self) -> Any:
+        return self._relay.call(self._relay.evaluate).result()
+
+    def _fed(self, name: str) -> int:
+        topic = self._writers[name][1]
+        inputs = [each for report in self._reports() for each in report.facts.inputs if each.name == topic]
+        return sum(each.counts.fed for each in inputs)
+
+    def _is_connected(self, name: str) -> bool:
+        # Each side finds the other for itself: what is sent before it has found the writer, a volatile reader misses.
+        if name in self._writers:
+            return self._writers[name][0].n_readers > 0
+        if not self._readers[name].n_writers:
+            return False
+        if self._running is None:
+            return True
+        node = self._relay.node
+        topics = self._relay._groups.bindings.topics  # noqa: SLF001
+        found = [output for topic in topics for output in topic.outputs.all]
+        outputs = {node.resolve_topic(each.topic): each.publisher for each in found}
+        publisher = outputs.get(name)
+        return name not in outputs or (publisher is not None and publisher.is_heard())
+
+    def _taken(self, name: str) -> int:
+        reader, texts = self._readers[name], self.seen.outputs[name]
+        while (content := reader.take()) is not None:
+            texts.append(self._told(content))
+        return len(texts)
+
+    def _told(self, content: bytes) -> str:
+        """Say which message this is."""
+        if len(content) < 20:
+            return content.hex()
+        stamp = int.from_bytes(content[4:8], "little", signed=True) * 10**9 + int.from_bytes(content[8:12], "little")
+        size = int.from_bytes(content[12:16], "little")
+        with suppress(UnicodeDecodeError):
+            offset = (stamp - self._begin) / _MS
+            when = f"{offset:.3f}" if abs(offset) < 86_400_000 else "other"
+            return f"{when} {content[16 : 16 + size - 1].decode()}"
+        return content[4:].hex()
+
+    def _forget(self, names: tuple[str, ...]) -> None:
+        for name in names:
+            self._writers.pop(name, None)
+            self._readers.pop(name, None)
+
+    def _until(self, condition: Callable[[], object], what: str, told: Callable[[], object] = lambda: "") -> None:
+        try:
+            self._world.wait_until(condition, what)
+        except Exception as error:
+            raise AssertionError(f"{error}; {told()}") from error
+
+    def _note(self, *words: Any) -> None:
+        self.seen.notes.append(words)
+
+    def _blank(self, text: str) -> str:
+        return _NUMBER.sub("#", _PLACE.sub("", text.replace(str(self._folder), "FOLDER")))
+
+
+def _name(each: EndpointInfo) -> str:
+    return f"{each.node_namespace} {each.node_name}"
+
+
+def _unlike(profile: Profile) -> list[str]:
+    """Say in what a profile is unlike a usual one of the graph."""
+    usual = Profile(history="unknown", depth=0, liveliness="automatic")
+    return [f"{key}={value}" for key, value in asdict(profile).items() if value != getattr(usual, key)]
+
+
+def _by_reason(dropped: Mapping[Any, int]) -> dict[str, int]:
+    return {reason.value: count for reason, count in dropped.items() if count}
+
+
+@contextmanager
+def _recorded() -> Iterator[_Recorder]:
+    recorder, level = _Recorder(), _LOG.level
+    _LOG.addHandler(recorder)
+    _LOG.setLevel(logging.INFO)
+    try:
+        yield recorder
+    finally:
+        _LOG.setLevel(level)
+        # What a relay that never came to its end has left.
+        _LOG.handlers.clear()
+
+
+def play(script: Script, world: World, folder: Path) -> Seen:
+    """Play a script in a ROS."""
+    player = Player(world, folder)
+    with _recorded() as recorder:
+        try:
+            for step in script.steps:
+                getattr(player, step.verb)(*step.words, **step.keys)
+        finally:
+            player.conclude()
+    player.seen.log = sorted({player._blank(each) for each in recorder.texts if not _BY_CHANCE.search(each)})  # noqa: SLF001
+    return player.seen

@@ -1,0 +1,61 @@
+"""The same scripts on real Fast DDS and on the simulated ROS show a user the same."""
+
+import multiprocessing
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from tests.conformance.player import Seen, play
+from tests.conformance.real import serve
+from tests.conformance.script import Script
+from tests.conformance.scripts import SCRIPTS
+from tests.conformance.simulated import SimulatedWorld
+from tests.faults.extent import IS_LONG
+
+_ON_DDS = [each for each in SCRIPTS if each.is_short or IS_LONG]
+
+
+def _titles(scripts) -> list[str]:
+    return [each.title for each in scripts]
+
+
+def _simulated(script: Script, folder: Path, seed: int = 1) -> Seen:
+    with SimulatedWorld(seed) as world:
+        return play(script, world, folder)
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory) -> Iterator[Callable[[Script, Path], Seen]]:
+    """Plays a script on real DDS, in a process for all of them."""
+    spawn = multiprocessing.get_context("spawn")
+    ours, theirs = spawn.Pipe()
+    process = spawn.Process(target=serve, args=(theirs, tmp_path_factory.mktemp("real")))
+    process.start()
+
+    def played(script: Script, folder: Path) -> Seen:
+        ours.send((script.title, folder))
+        answer = ours.recv()
+        assert isinstance(answer, Seen), answer
+        return answer
+
+    yield played
+    ours.send(None)
+    process.join()
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=_titles(SCRIPTS))
+def test_the_simulator_shows_the_same_with_any_seed(script, tmp_path):
+    one, other = (_simulated(script, tmp_path, seed) for seed in (1, 2))
+    assert one == other
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("script", _ON_DDS, ids=_titles(_ON_DDS))
+def test_real_dds_and_the_simulator_show_the_same(script, real, tmp_path):
+    seen, expected = real(script, tmp_path), _simulated(script, tmp_path)
+    for field in script.blind:
+        setattr(seen, field, getattr(expected, field))
+    assert seen == expected
