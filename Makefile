@@ -12,7 +12,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Where an image sets it, each process that the tests start would compile all modules of this tree again: 0.06 to 0.2 s.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-fast simulate test-kilted test-container test-workspace test-fleet test-lerobot test-release test-bare faults soak lint schema reference docs bench wheel release clean
+.PHONY: demo test test-fast simulate test-kilted test-container test-workspace test-fleet test-lerobot test-release test-bare test-cost faults soak lint schema reference docs bench wheel release clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -102,6 +102,10 @@ docs: $(VENV)/docs
 bench: $(VENV)/test
 	$(BIN)/python bench/engine.py
 	$(BIN)/python bench/relay.py
+
+# Compares what a message costs with the last release. A regression of a tenth fails, be the machine busy or not.
+test-cost: $(VENV)/test
+	.ci/cost $(BIN)/python
 
 # What a release hands out, built and tried: an sdist, and a wheel for this machine and this Python.
 wheel: $(BIN)/python

@@ -53,6 +53,7 @@ LOADS = {
     "4 x 100 Hz Imu": Load("Imu", 0, 100, topics=4),
     "9 x 50 Hz Imu": Load("Imu", 0, 50, topics=9, apart_s=0),
     "2 x 1 kHz x 1 kB": Load("Image", 1_000, 1_000),
+    "10 x 2 x 20 Hz x 1 kB": Load("Image", 1_000, 20, groups=10),
     "2 x 20 Hz x 1 MB": Load("Image", 1_000_000, 20, environ=LARGE),
     "2 x 20 Hz x 6 MB": Load("Image", 6_000_000, 20, environ=LARGE),
 }

@@ -36,8 +36,12 @@ def main():
     )
     parser.add_argument("--rounds", type=int, default=200, help="rounds at most (default: %(default)s)")
     parser.add_argument("--width", type=float, default=0.05, help="of an interval, to its ratio (default: %(default)s)")
+    parser.add_argument(
+        "--most", type=float, help="end with 1 where a candidate costs more than so many times the first for certain"
+    )
     parser.add_argument("candidates", nargs="+", metavar="CANDIDATE")
     asked = parser.parse_args()
+    dear = []
     with tempfile.TemporaryDirectory() as folder:
         workshop = Workshop(Path(folder))
         for name in asked.load or [next(iter(LOADS))]:
@@ -46,8 +50,13 @@ def main():
             except ValueError as error:
                 parser.error(str(error))
             print(f"{name}:", flush=True)
-            show(candidates, *in_turns(candidates, most=asked.rounds, width=asked.width))
-    return 0
+            kept, n_rounds = in_turns(candidates, most=asked.rounds, width=asked.width)
+            show(candidates, kept, n_rounds)
+            costs = zip(candidates, ratios(kept, "cpu_us") if kept else (), strict=False)
+            dear += [(name, each.name, cost) for each, cost in costs if asked.most and cost.is_above(asked.most)]
+    for name, candidate, cost in dear:
+        print(f"{name}: {candidate} costs {shown(cost)} times the first, more than {asked.most:g} times for certain")
+    return int(bool(dear))
 
 
 def show(candidates, kept, n_rounds):

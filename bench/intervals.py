@@ -21,6 +21,10 @@ class Interval(NamedTuple):
         """How wide it is, as a share of the median."""
         return (self.high - self.low) / self.median
 
+    def is_above(self, most):
+        """Whether the whole of it is."""
+        return self.low > most
+
 
 def median_interval(values):
     """Return the median of one or more values and its confidence interval, which has no end below 6 values.

@@ -19,6 +19,14 @@ def test_the_interval_of_a_median_is_between_two_of_its_values(n, low, high):
     assert median_interval(values) == (low, median(values), high)
 
 
+def test_a_ratio_is_above_a_bound_if_its_whole_interval_is():
+    assert median_interval([1.11] * 6 + [1.2] * 6).is_above(1.1)
+    assert not median_interval([1.09] * 3 + [1.2] * 9).is_above(1.2)
+    assert not median_interval([1.09] * 4 + [1.2] * 5).is_above(1.1)
+    # Too few rounds tell nothing.
+    assert not median_interval([3.0] * 5).is_above(1.1)
+
+
 def test_five_values_or_fewer_give_no_interval_however_alike_they_are():
     assert median_interval([1.0] * 5) == (-math.inf, 1.0, math.inf)
     assert median_interval([1.0] * 6).width == 0

@@ -201,7 +201,9 @@ class Judge:
             return ()
         is_back = (facts.figures.share.value or 1) >= BACK
         wide = next((each for each in found if each.code is Code.OVER_SLOP), None)
-        self._too_wide, before = wide or (None if is_back else self._too_wide), self._too_wide
+        # What is the effect of another cause is over when its cause is.
+        own = wide if wide is not None and self._root(wide, facts) is wide else None
+        self._too_wide, before = own or (None if is_back else self._too_wide), self._too_wide
         if wide is not None or is_back or before is None or self._is_explained(Code.OVER_SLOP, facts):
             return ()
         return (before,)
@@ -240,7 +242,9 @@ class Judge:
         blamed = [root for finding, root in roots if finding.severity is Severity.ERROR]
         if blamed and not any(finding.severity is Severity.ERROR for finding in said):
             culprit = blamed[0]
-            said = [replace(culprit, severity=Severity.ERROR), *(each for each in said if each is not culprit)]
+            # It may be found now too, too small to explain anything.
+            others = (each for each in said if (each.code, each.input) != (culprit.code, culprit.input))
+            said = [replace(culprit, severity=Severity.ERROR), *others]
         return tuple(said)
 
     def _as_bad_as_it_stands(self, said: tuple[Finding, ...], facts: GroupFacts) -> tuple[Finding, ...]:

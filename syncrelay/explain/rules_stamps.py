@@ -189,9 +189,10 @@ def several_publishers(facts: GroupFacts, index: int, an_input: InputFacts) -> F
     """Find that the stamps of those who publish an input conflict."""
     figures = an_input.figures
     publishers = [each for each in an_input.graph.publishers if each.type == an_input.type]
-    if not facts.by_stamp or len(publishers) < 2:  # noqa: PLR2004  one alone conflicts with nobody
+    if len(publishers) < 2:  # noqa: PLR2004  one alone conflicts with nobody
         return
-    disorder = figures.out_of_order + (0 if facts.is_held(index) else figures.duplicates)
+    disorder = figures.out_of_order + (0 if facts.is_held(index) else figures.duplicates) if facts.by_stamp else 0
+    # Whatever messages are matched by, it begins anew when stamps fall.
     if figures.swings >= _FEWEST_SWINGS:
         conflict = f"their stamps are {words.duration(figures.swung_by)} apart"
     elif disorder > _FAULTY * figures.fed:

@@ -5,7 +5,9 @@ from dataclasses import replace
 from typing import Unpack
 
 from syncrelay.config import GroupConfig
+from syncrelay.explain.clocks import Step
 from syncrelay.explain.facts import Around, GroupFacts, InputFacts, InputGraph, serving
+from syncrelay.explain.findings import SECOND
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.standing import StandingWatch
@@ -39,6 +41,7 @@ class GroupWatch:
         self._was_paused = False
         self._unpaused: int | None = None
         self._woke: int | None = None
+        self._clock_set: Step | None = None
         self._observation = Observation(config, began=began)
         self._standing = StandingWatch()
         # Keys are not kept: what is matched by them cannot be run again. Nor can what a clock triggered: it may have
@@ -56,13 +59,21 @@ class GroupWatch:
         keys: Sequence[Hashable] | None = None,
         by_clock: Callable[[int], int] | None = None,
         woke: int | None = None,
+        clock_set: Step | None = None,
         now: int,
     ) -> None:
         """Take what came and left since the last call; see Observation. `keys` are the newest messages'.
 
         `by_clock` tells, where time is simulated, what its clock showed at a time of receipt. `woke` is when the group
-        was last fed again after a sleep: it is judged by what came since.
+        was last fed again after a sleep: it is judged by what came since. `clock_set` is how this machine's clock was
+        last set.
         """
+        if clock_set is not None and clock_set != self._clock_set:
+            self._clock_set = clock_set
+            if clock_set.by >= SECOND:
+                # What came before was received by another clock: it would count as long ago.
+                self._observation.begin_again(now)
+                arrivals = [[each for each in came if each[1] > now - clock_set.by // 2] for came in arrivals]
         if woke is not None and woke != self._woke:
             self._woke = woke
             self._standing = StandingWatch()

@@ -178,8 +178,9 @@ class GroupBindings:
         """Make a publisher; return False if it can only be made once these have ended. Raises RefusedError."""
         try:
             binding.topic.make_publisher(binding.output)
-        except RefusedError:
-            if not self._entities.frees(binding.output.topic, ending):
+        except RefusedError as error:
+            # What DDS refuses for another reason than a type that is held, it would refuse to those that run too.
+            if error.refusal.held_as is None or not self._entities.frees(binding.output.topic, ending):
                 raise
             return False
         return True

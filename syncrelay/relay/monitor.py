@@ -174,6 +174,7 @@ class Monitor:
             keys=batch.keys,
             by_clock=by_clock,
             woke=binding.group.woke,
+            clock_set=self._system_clock.last_step(now),
             now=now,
         )
         self.heard(binding.group.config.name, batch.arrivals)

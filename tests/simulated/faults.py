@@ -53,6 +53,9 @@ def needs() -> Mapping[str, tuple[str, ...]]:
 def concerns(kind: str, target: str, group: Group) -> bool:
     """Whether an event concerns a group."""
     needed = KINDS[kind].needs
+    if kind == "refuse_subscriptions":
+        # Other groups share its topics.
+        return True
     if "sensor" in needed:
         return target in group.topics
     return target == group.name if "group" in needed else True

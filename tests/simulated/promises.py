@@ -236,7 +236,7 @@ class Promises:
             if seen.at < SETTLED_S:
                 continue
             near = [step for step in steps if step.at - 1 <= seen.at <= step.at + step.seconds + HEALED_S]
-            allowed = self._allowed(group, near)
+            allowed = self._allowed(group, near, seen.at)
             what = f"{seen.at:.2f} s: {group.name}: {seen.code}: {seen.text}"
             if seen.code not in allowed:
                 yield f"{what}\n    is not so; allowed: {sorted(allowed)}"
@@ -258,13 +258,15 @@ class Promises:
                     yield f"{what}\n    is about {sorted(seen.about)} and not {step.target}"
                     return
 
-    def _allowed(self, group: Group, near: list[Step]) -> frozenset[str]:
+    def _allowed(self, group: Group, near: list[Step], at: float) -> frozenset[str]:
         """Return what may be found first, a while before a fault is named and after it has ended too."""
         kinds = {step.kind for step in near}
         allowed = _QUIET.union(*(KINDS[kind].names for kind in kinds))
         if any(KINDS[kind].spoils for kind in kinds):
             # Before its cause is known, and while the sets that it cost count.
             allowed |= {"few_sets"}
+            if any(at - step.at <= NAMED_S for step in near):
+                allowed |= {"over_slop"}
             allowed |= {"waiting_for_optional"} if group.optional else set()
         if self.world.plan.by_sim_time and "other_clock" in kinds:
             # With a simulated clock, steps ahead are told by the stamps of all messages alone: that takes a while.

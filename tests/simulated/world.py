@@ -299,6 +299,8 @@ class World:
         self.scheduler.after(int(chance.uniform(0, 3) * SECOND), self._start_relay)
 
     def _start_relay(self) -> None:
+        # With a faulty file it would not start.
+        self.write_file()
         self.relay = RelayProcess(self, self.path)
         if self.plan.is_managed:
             self.scheduler.after(2 * SECOND, self.bring_up)
