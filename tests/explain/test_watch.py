@@ -4,6 +4,7 @@ import pytest
 
 from syncrelay.config import load_text
 from syncrelay.explain import ClockState, Endpoint, GroupWatch, InputGraph, Refusal, Tolerance
+from syncrelay.explain.clocks import Step
 from syncrelay.sync.counts import InputCounts
 from tests.explain.support.groups import BEGAN, IMAGE, MS, S
 from tests.ros.configs import config
@@ -92,3 +93,13 @@ def test_how_late_messages_are_is_told_by_one_clock():
     simulated = ClockState(received=True)
     assert group.facts(GRAPH, now=BEGAN + S, clock=simulated).lag(0) == 7 * MS
     assert group.facts(GRAPH, now=BEGAN + S, clock=ClockState(received=False)).lag(0) is None
+
+
+def test_what_came_before_this_machines_clock_was_set_forward_is_forgotten():
+    made, nothing = watch(slop="20ms"), InputCounts(0, 0, {}, 0)
+    made.add([[(BEGAN, BEGAN)]] * 2, [], [nothing] * 2, 0, now=BEGAN + S)
+    now = BEGAN + 3600 * S
+    made.add([[(BEGAN, BEGAN + S), (now, now - MS)]] * 2, [], [nothing] * 2, 0, clock_set=Step(now, 3599 * S), now=now)
+    found = made.facts(GRAPH, now=now)
+    assert [list(each.figures.received) for each in found.inputs] == [[now - MS]] * 2
+    assert found.figures.began == now

@@ -92,6 +92,9 @@ FOUND = {
     "disorder": a_group(camera(figures={"out_of_order": 2}), LIDAR),
     "disorder of two publishers": a_group(camera(figures={"out_of_order": 50}, publishers=TWO), LIDAR),
     "two publishers by two clocks": a_silent_group(camera(figures=SWINGING, publishers=TWO), LIDAR),
+    "two publishers by two clocks of a group matched by key": a_group(
+        camera(figures=SWINGING, publishers=TWO), LIDAR, by_stamp=False
+    ),
     "a node that publishes twice": a_group(camera(figures=SWINGING, publishers=(Endpoint("/a", IMAGE),) * 2), LIDAR),
     "three publishers": a_group(camera(figures=SWINGING, publishers=(*TWO, Endpoint("/c", IMAGE))), LIDAR),
     "one publisher of two clocks": a_group(camera(figures=SWINGING), LIDAR),
