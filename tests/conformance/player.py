@@ -4,8 +4,8 @@ import json
 import logging
 import re
 import struct
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
@@ -197,8 +197,8 @@ class _Recorder(logging.Handler):
 class Player:
     """The verbs of scripts. Times in scripts are milliseconds from the script's begin."""
 
-    def __init__(self, world: World, folder: Path) -> None:
-        self._world, self._folder = world, folder
+    def __init__(self, world: World, folder: Path, texts: Sequence[str]) -> None:
+        self._world, self._folder, self._texts = world, folder, texts
         self._begin = world.runtime.time_ns()
         self._writers: dict[str, tuple[Writer, str]] = {}
         self._readers: dict[str, Reader] = {}
@@ -387,13 +387,12 @@ class Player:
         *,
         publishers: int | None = None,
         subscribers: int | None = None,
-        reliability: str = "",
         named: bool = False,
+        **offered: str,
     ) -> None:
         """Who publishes and subscribes to a topic, with what QoS, is noted once there are so many.
 
-        So it is once the publishers are of this reliability; and with `named`, once the names of the nodes have come,
-        which may take 3 s.
+        So it is once the publishers offer this; and with `named`, once the names of the nodes have come.
         """
         wanted, graph = (publishers, subscribers), self._world.graph
 
@@ -401,11 +400,10 @@ class Player:
             return graph.publishers_of(topic), graph.subscribers_of(topic)
 
         def are_there() -> bool:
-            offered = [each.profile.reliability for each in found()[0]]
             return (
                 all(number in (None, len(each)) for number, each in zip(wanted, found(), strict=True))
                 and (not named or all(each.is_named for kind in found() for each in kind))
-                and (not reliability or all(each == reliability for each in offered))
+                and all(getattr(each.profile, key) == value for each in found()[0] for key, value in offered.items())
             )
 
         self._until(are_there, f"{publishers} publishers and {subscribers} subscribers of {topic}", found)
@@ -435,6 +433,10 @@ class Player:
         )
         self._note("reload error", self._blank(self._relay.state().reload_error or ""))
 
+    def says(self, words: str) -> None:
+        """The relay has warned in these words."""
+        self._until(lambda: any(words in each for each in self._texts), words)
+
     def phase(self, phase: str) -> None:
         """The relay is in this phase."""
         self._until(lambda: self._reports() is not None and self._relay.state().phase.value == phase, f"phase {phase}")
@@ -457,12 +459,20 @@ class Player:
                 ],
             )
 
-    def conclude(self) -> None:
-        """End what runs, and take the last messages."""
+    def conclude(self) -> Seen:
+        """End what runs, take the last messages, and return what was seen."""
         if self._running is not None:
             self.stop()
         for name in self._readers:
             self._taken(name)
+        self.seen.log = sorted({self._blank(each) for each in self._texts if not _BY_CHANCE.search(each)})
+        return self.seen
+
+    def abandon(self) -> None:
+        """End what still runs."""
+        if self._running is not None:
+            self._running.end()
+            self._world.wait_until(lambda: self._running is None or self._running.has_ended, "the end of the relay")
 
     @property
     def _require(self) -> _Running:
@@ -550,27 +560,18 @@ def _by_reason(dropped: Mapping[Any, int]) -> dict[str, int]:
     return {reason.value: count for reason, count in dropped.items() if count}
 
 
-@contextmanager
-def _recorded() -> Iterator[_Recorder]:
+def play(script: Script, world: World, folder: Path) -> Seen:
+    """Play a script in a ROS."""
     recorder, level = _Recorder(), _LOG.level
     _LOG.addHandler(recorder)
     _LOG.setLevel(logging.INFO)
+    player = Player(world, folder, recorder.texts)
     try:
-        yield recorder
+        for step in script.steps:
+            getattr(player, step.verb)(*step.words, **step.keys)
+        return player.conclude()
     finally:
+        player.abandon()
         _LOG.setLevel(level)
-        # What a relay that never came to its end has left.
+        # With what a relay that never came to its end has left.
         _LOG.handlers.clear()
-
-
-def play(script: Script, world: World, folder: Path) -> Seen:
-    """Play a script in a ROS."""
-    player = Player(world, folder)
-    with _recorded() as recorder:
-        try:
-            for step in script.steps:
-                getattr(player, step.verb)(*step.words, **step.keys)
-        finally:
-            player.conclude()
-    player.seen.log = sorted({player._blank(each) for each in recorder.texts if not _BY_CHANCE.search(each)})  # noqa: SLF001
-    return player.seen

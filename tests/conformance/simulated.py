@@ -6,7 +6,7 @@ from typing import Any, Self
 from syncrelay.config.profile import Profile
 from syncrelay.relay.ports import Node
 from syncrelay.relay.types import import_type
-from tests.simulated.bus import Bus, BusNode, Participant, Reader, Writer
+from tests.simulated.bus import Bus, BusNode, Participant, Reader, Weather, Writer
 from tests.simulated.node import SimulatedBackend, SimulatedGraph, SimulatedNode
 from tests.simulated.scheduler import SECOND, Process, Scheduler, SimulatedRuntime
 
@@ -30,7 +30,7 @@ class SimulatedWorld:
 
     def __init__(self, seed: int) -> None:
         self.scheduler = Scheduler(seed)
-        self._bus = Bus(self.scheduler)
+        self._bus = Bus(self.scheduler, Weather(missed=0.3))
         self._participants: dict[str, Participant] = {}
         self._nodes: dict[tuple[str, str], BusNode] = {}
         self.process = Process(self.scheduler, "relay")
@@ -86,11 +86,12 @@ class SimulatedWorld:
         node.publisher(import_type(type_name), topic, Profile(depth=1))
 
     def wait_until(self, condition: Callable[[], object], what: str) -> None:
-        end = self.scheduler.now + 30 * SECOND
+        end, rest = self.scheduler.now + 60 * SECOND, 0.02
         while not condition():
             if self.scheduler.now > end:
                 raise TimeoutError(f"waited in vain for {what}")
-            self.scheduler.sleep(0.05)
+            self.scheduler.sleep(rest)
+            rest = min(0.3, 1.5 * rest)
 
     def call(self, node: Node, service: str) -> tuple[bool, str]:
         answer = self._answer(lambda answered: node.request(service, answered))  # type: ignore[attr-defined]
