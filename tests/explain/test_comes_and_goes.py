@@ -10,6 +10,7 @@ import pytest
 
 from syncrelay.explain import Endpoint
 from tests.explain.scenario import IMU, Source, Told, run
+from tests.faults.extent import chosen
 
 
 class Calm(TypedDict):
@@ -63,20 +64,20 @@ def a_lidar_that_returns(
 
 
 @pytest.mark.parametrize(("ppm", "slop"), [(10_000, "20ms"), (20_000, "20ms"), (1000, "20ms"), (200, "5ms")])
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(chosen(short=2, long=8)))
 @pytest.mark.long
 def test_a_clock_that_drifts_is_named_however_late_the_rig_starts(seed, ppm, slop):
     assert a_rig_that_starts_late(random.Random(seed), ppm=ppm, slop=slop).codes == {"clock_drift"}
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(chosen(short=5, long=20)))
 def test_who_comes_back_is_not_blamed(seed):
     told = a_lidar_that_returns(random.Random(seed))
     assert told.codes == {"no_publisher"}
     assert any(line.text.startswith("recovered") for line in told.lines)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(chosen(short=5, long=20)))
 def test_who_was_killed_and_comes_back_is_not_blamed(seed):
     assert a_lidar_that_returns(random.Random(seed), is_killed=True).codes <= {"silent", "no_publisher"}
 
@@ -84,7 +85,7 @@ def test_who_was_killed_and_comes_back_is_not_blamed(seed):
 @pytest.mark.parametrize(
     ("ahead_s", "code"), [(-3, "other_clock"), (3, "other_clock"), (-0.45, "over_slop"), (0.06, "over_slop")]
 )
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(chosen(short=3, long=10)))
 @pytest.mark.long
 def test_who_comes_back_with_another_clock_is_blamed_for_that_alone(seed, ahead_s, code):
     told = a_lidar_that_returns(random.Random(seed), within=(0.3, 8), ahead_s=ahead_s)

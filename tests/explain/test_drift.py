@@ -8,6 +8,7 @@ from syncrelay.explain.clocks import Drift, apart, drift
 from syncrelay.explain.rules_stamps import clock_drift
 from tests.explain.support.cases import STEADY
 from tests.explain.support.groups import BEGAN, MS, S, a_group, an_input
+from tests.faults.extent import chosen
 
 
 def points(delay, *, n=120, noise=0.0):
@@ -80,7 +81,7 @@ def is_told(found):
     return bool(list(clock_drift(a_group(an_input("/gps", figures={"drift": found}), STEADY))))
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(chosen(short=5, long=40)))
 @pytest.mark.long
 def test_a_few_delays_of_a_slow_sensor_that_lie_on_a_line_by_chance_are_no_drift(seed):
     chance = random.Random(seed)

@@ -9,12 +9,16 @@ import pytest
 
 from syncrelay.explain import Endpoint
 from tests.explain.scenario import IMU, Noise, Source, run
+from tests.faults.extent import chosen
+
+pytestmark = pytest.mark.faults
 
 REAL: Noise = {"jitter_ms": 1.0, "delay_jitter_ms": 2.0}
 _SECONDS = 120
 # By then, all is well again that was held up.
 _RESTED_S = 55
-_SEEDS = range(3)
+_SEEDS = range(chosen(short=1, long=3))
+_LATER = range(chosen(short=2, long=6))
 
 
 class _Rig(NamedTuple):
@@ -99,7 +103,6 @@ EVENTS = {
 @pytest.mark.parametrize("name", RIGS)
 @pytest.mark.parametrize("event", EVENTS)
 @pytest.mark.parametrize("seed", _SEEDS)
-@pytest.mark.long
 def test_nothing_is_found_but_what_happens(name, event, seed):
     rig, happens = RIGS[name], EVENTS[event]
     keys = happens.keys(random.Random(seed))
@@ -116,7 +119,7 @@ def test_nothing_is_found_but_what_happens(name, event, seed):
 
 
 @pytest.mark.parametrize("name", RIGS)
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", _LATER)
 def test_of_a_rig_that_starts_later_than_the_relay_nothing_is_said(name, seed):
     """The graph shows each publisher at some moment, and its messages come then or up to 4 s later."""
     chance, rig = random.Random(f"{seed} {name}"), RIGS[name]

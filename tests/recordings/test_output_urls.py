@@ -1,53 +1,18 @@
-"""What commands write behind URLs, in a process whose fsspec knows one more store: a folder, as if it were far away."""
+"""What commands write behind URLs, where fsspec knows one more store: a folder, as if it were far away."""
 
 import json
+from functools import partial
 from pathlib import Path
 
 import pyarrow.dataset
 import pyarrow.parquet
 import pytest
 
-from tests.cli.command import run, run_python
+from tests.cli.command import ROOT, run, run_here, run_python
 from tests.recordings.bag.making import rig, rig_file, write_mcap
+from tests.recordings.store import known_store
 
-pytest.importorskip("fsspec", reason="the extra `fleet` is not installed")
 pytestmark = pytest.mark.process
-
-# As a bucket: it has no folders of its own, and `wrong` files are refused so often; it is full where that is negative.
-_STORE = """
-import shutil, sys
-import fsspec
-from fsspec.implementations.local import LocalFileSystem
-
-root, wrong = sys.argv[1], int(sys.argv[2])
-
-class Store(LocalFileSystem):
-    protocol = "store"
-
-    @classmethod
-    def _strip_protocol(cls, path):
-        path = str(path)
-        path = path.removeprefix("store://").rstrip("/")
-        return path if path.startswith(root) else f"{root}/{path}".rstrip("/")
-
-    def unstrip_protocol(self, name):
-        return "store://" + self._strip_protocol(name)[len(root) + 1:]
-
-    def put_file(self, source, target, **options):
-        global wrong
-        if wrong < 0:
-            raise OSError(28, "No space left on device")
-        if wrong and not target.endswith("_ledger.jsonl"):
-            wrong -= 1
-            raise ConnectionResetError(104, "Connection reset by peer")
-        shutil.copy(source, target)
-
-fsspec.register_implementation("store", Store)
-from syncrelay import urls
-urls._FIRST_WAIT = 0.01
-from syncrelay.cli import main
-sys.exit(main(sys.argv[3:]))
-"""
 
 
 @pytest.fixture
@@ -60,7 +25,14 @@ def folder(tmp_path: Path) -> Path:
 
 def stored(folder: Path, *words: str, wrong: int = 0):
     """Run syncrelay where store:// is the folder `store`, which refuses the first files."""
-    return run_python("-c", _STORE, str(folder / "store"), str(wrong), *words, folder=folder)
+    with known_store(folder / "store", wrong):
+        return run_here(*words, folder=folder)
+
+
+def stored_by_process(folder: Path, *words: str, wrong: int = 0, file_size: int = -1):
+    """The same by a process, which may have processes of its own, and write no file larger than that."""
+    told = (str(folder / "store"), str(wrong), str(file_size))
+    return run_python("-m", "tests.recordings.store", *told, *words, folder=folder, environ={"PYTHONPATH": f"{ROOT}"})
 
 
 def names(folder: Path) -> list[str]:
@@ -73,7 +45,7 @@ def test_a_replay_is_written_to_a_store_as_to_a_disk(name, folder):
     far = stored(folder, *words, f"store://day/{name}", wrong=2)
     assert far.returncode == 0, far.stderr
     assert f"wrote store://day/{name}: " in far.stderr
-    assert run(*words, name, folder=folder).returncode == 0
+    assert run_here(*words, name, folder=folder).returncode == 0
     assert names(folder / "store" / "day") == [
         str(path.relative_to(folder)) for path in sorted([folder / name, *(folder / name).rglob("*")]) if path.is_file()
     ]
@@ -93,23 +65,20 @@ def test_what_a_store_refuses_ends_the_command_and_leaves_nothing_behind(folder)
     assert not [path for path in folder.iterdir() if path.name.startswith(".syncrelay")]
 
 
-_FULL = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
-
-
 _NOT_HERE = "cannot be written to a temporary folder of this machine before the upload: File too large"
 
 
 @pytest.mark.parametrize(
-    ("script", "wrong", "why"),
+    ("run", "why"),
     [
-        (_STORE, -1, "cannot be written: No space left on device\n"),
-        (_FULL + _STORE, 0, f"{_NOT_HERE}: set TMPDIR to another folder\n"),
+        (partial(stored, wrong=-1), "cannot be written: No space left on device\n"),
+        (partial(stored_by_process, file_size=1000), f"{_NOT_HERE}: set TMPDIR to another folder\n"),
     ],
     ids=["in the store", "here"],
 )
-def test_where_there_is_no_space_is_said(script, wrong, why, folder):
+def test_where_there_is_no_space_is_said(run, why, folder):
     words = ["replay", "rig.mcap", "--config", "f.yaml", "-o", "store://day/out"]
-    done = run_python("-c", script, str(folder / "store"), str(wrong), *words, folder=folder)
+    done = run(folder, *words)
     assert (done.returncode, done.stderr) == (1, f"syncrelay: store://day/out: {why}")
     assert names(folder / "store") == []
 
@@ -123,7 +92,7 @@ def test_where_there_is_no_space_is_said(script, wrong, why, folder):
     ],
 )
 def test_a_server_takes_no_files_and_that_is_said(words, folder):
-    done = run(*words, folder=folder)
+    done = run_here(*words, folder=folder)
     assert done.returncode == 1
     assert "a server takes no files: expected a path, s3://, gs:// or another store" in done.stderr
     assert "hush" not in done.stderr
@@ -132,7 +101,7 @@ def test_a_server_takes_no_files_and_that_is_said(words, folder):
 @pytest.mark.parametrize("name", ["out", "out.mcap"])
 def test_a_chain_of_urls_is_refused_and_makes_no_folder(name, folder):
     before = sorted(folder.iterdir())
-    done = run("replay", "rig.mcap", "--config", "f.yaml", "-o", f"simplecache::s3://bucket/{name}", folder=folder)
+    done = run_here("replay", "rig.mcap", "--config", "f.yaml", "-o", f"simplecache::s3://bucket/{name}", folder=folder)
     assert (done.returncode, "`::` in a URL is not supported" in done.stderr) == (1, True)
     assert sorted(folder.iterdir()) == before
 
@@ -156,7 +125,7 @@ def test_the_results_of_a_fleet_are_kept_in_a_store_and_done_once(command, optio
     for name in ("a", "b"):
         write_mcap(folder / "day" / f"{name}.mcap", rig())
     words = [command, "day", "--config", "f.yaml", "--jobs", "2", option]
-    done = stored(folder, *words, "store://results/of day", wrong=1)
+    done = stored_by_process(folder, *words, "store://results/of day", wrong=1)
     assert (done.returncode, done.stdout) == (0, "store://results/of day: 2 recordings: 2 done\n"), done.stderr
     into = folder / "store" / "results" / "of day"
     assert run(*words, "here", folder=folder).returncode == 0
@@ -164,22 +133,22 @@ def test_the_results_of_a_fleet_are_kept_in_a_store_and_done_once(command, optio
     entries = [json.loads(line) for line in (into / "_ledger.jsonl").read_text().splitlines()[1:]]
     assert [entry["state"] for entry in entries] == ["done", "done"]
     if command == "export":
-        assert "--overwrite" in stored(folder, *words, "store://results/of day", "--raw").stderr
+        assert "--overwrite" in stored_by_process(folder, *words, "store://results/of day", "--raw").stderr
         tables = [pyarrow.dataset.dataset(where).to_table().num_rows for where in (str(into), str(folder / "here"))]
         assert tables[0] == tables[1] > 70
 
-    assert stored(folder, *words, "store://results/of day").stdout.endswith("2 done before\n")
+    assert stored_by_process(folder, *words, "store://results/of day").stdout.endswith("2 done before\n")
     next(into.glob("b-*/*")).unlink()
-    assert stored(folder, *words, "store://results/of day").stdout.endswith("1 done, 1 done before\n")
+    assert stored_by_process(folder, *words, "store://results/of day").stdout.endswith("1 done, 1 done before\n")
     (folder / "day" / "b.mcap").write_bytes(b"none any more")
-    assert stored(folder, *words, "store://results/of day").returncode == 1
+    assert stored_by_process(folder, *words, "store://results/of day").returncode == 1
     assert [name for name in names(into) if name.startswith("b-")] == []
 
 
 def test_the_table_of_facts_is_written_to_a_store(folder):
     words = ["analyze", "rig.mcap", "nothing.mcap", "--config", "f.yaml", "--json", "--into"]
     (folder / "nothing.mcap").write_bytes(b"")
-    far, near = stored(folder, *words, "store://new"), run(*words, "here", folder=folder)
+    far, near = stored(folder, *words, "store://new"), run_here(*words, "here", folder=folder)
     assert (far.returncode, far.stdout) == (near.returncode, near.stdout) == (1, near.stdout), far.stderr
     assert names(folder / "store" / "new") == names(folder / "here")
     tables = [

@@ -28,6 +28,7 @@ from syncrelay.recordings.bag import is_recording, open_recording
 from syncrelay.recordings.bag.remote_file import RemoteFile
 from syncrelay.recordings.bag.storage import find
 from syncrelay.urls import redacted
+from tests.faults.extent import chosen
 from tests.recordings.bag.damage import FRAMES, KINDS, damaged
 from tests.recordings.bag.file_server import FileServer, file_server
 from tests.recordings.bag.making import rig, write_mcap, write_ros1, write_rosbag2
@@ -180,7 +181,7 @@ def test_what_cannot_be_read_by_ranges_is_copied_here_and_that_is_said(kind, ser
 
 
 @pytest.mark.parametrize("fault", ["drop", "cut", "500", "503", "429", "shifted", "short", "whole"])
-@pytest.mark.parametrize("number", [1, 2])
+@pytest.mark.parametrize("number", chosen(short=[1], long=[1, 2]))
 @pytest.mark.long
 def test_what_goes_wrong_once_is_tried_again(fault, number, server, tmp_path):
     path = write_mcap(tmp_path / "rig.mcap", rig_with_images(10))
