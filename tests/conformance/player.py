@@ -258,6 +258,10 @@ class Player:
         """The relay's file holds this."""
         self._path.write_text(text)
 
+    def remove(self) -> None:
+        """The relay's file is removed."""
+        self._path.unlink()
+
     def ready(self, *names: str) -> None:
         """All publishers and subscribers, or these, are connected with the relay, or somebody, in both directions."""
         for name in names or (*self._writers, *self._readers):
@@ -498,7 +502,9 @@ class Player:
     def _is_connected(self, name: str) -> bool:
         # Each side finds the other for itself: what is sent before it has found the writer, a volatile reader misses.
         if name in self._writers:
-            return self._writers[name][0].n_readers > 0
+            writer, topic = self._writers[name]
+            inputs = [each for report in self._reports() for each in report.facts.inputs] if self._running else []
+            return writer.n_readers > 0 and all(each.graph.publishers for each in inputs if each.name == topic)
         if not self._readers[name].n_writers:
             return False
         if self._running is None:
