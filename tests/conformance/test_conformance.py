@@ -46,6 +46,7 @@ def real(tmp_path_factory) -> Iterator[Callable[[Script, Path], Seen]]:
     process.join()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("script", SCRIPTS, ids=_titles(SCRIPTS))
 def test_the_simulator_shows_the_same_with_any_seed(script, tmp_path):
     one, other = (_simulated(script, tmp_path, seed) for seed in (1, 2))
@@ -53,6 +54,7 @@ def test_the_simulator_shows_the_same_with_any_seed(script, tmp_path):
 
 
 @pytest.mark.ros
+@pytest.mark.faults
 @pytest.mark.parametrize("script", _ON_DDS, ids=_titles(_ON_DDS))
 def test_real_dds_and_the_simulator_show_the_same(script, real, tmp_path):
     seen, expected = real(script, tmp_path), _simulated(script, tmp_path)
