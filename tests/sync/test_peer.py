@@ -32,7 +32,7 @@ def driver(request):
     if not binary.exists():
         libraries = ("-lmessage_filters", "-lrosconsole", "-lrostime", "-lboost_thread")
         unfinished = binary.with_suffix(f".{os.getpid()}")
-        subprocess.run([compiler, "-std=c++17", "-w", DRIVER, "-o", unfinished, *libraries], check=True)
+        subprocess.run([str(compiler), "-std=c++17", "-w", DRIVER, "-o", unfinished, *libraries], check=True)
         unfinished.replace(binary)
     return binary
 
