@@ -20,7 +20,7 @@ fsspec = pytest.importorskip("fsspec", reason="the extra `fleet` is not installe
 local = pytest.importorskip("fsspec.implementations.local")
 
 
-class _Store(local.LocalFileSystem):  # type: ignore[misc, name-defined]
+class _Store(local.LocalFileSystem):  # type: ignore[name-defined]
     """As a bucket: it has no folders of its own, and `wrong` files are refused so often; it is full where negative."""
 
     protocol = "store"
