@@ -69,7 +69,7 @@ test-lerobot:
 # and tries what must hold of all inputs on many more of them. `make test` has the short form of each.
 faults: $(VENV)/test
 	.ci/network-tools
-	SYNCRELAY_FAULTS=long $(BIN)/python -m pytest -m "(faults or peer or hypothesis) and not soak" $(ARGS)
+	SYNCRELAY_FAULTS=long $(BIN)/python -m pytest -m "(faults or long or peer or hypothesis) and not soak" $(ARGS)
 
 # A quarter of an hour and two million messages.
 soak: $(VENV)/test

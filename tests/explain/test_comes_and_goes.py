@@ -12,6 +12,8 @@ from syncrelay.explain import Endpoint
 from tests.explain.scenario import IMU, Source, Told, run
 from tests.faults.extent import chosen
 
+pytestmark = pytest.mark.long
+
 
 class Calm(TypedDict):
     """Keywords of `Source`."""
@@ -65,7 +67,6 @@ def a_lidar_that_returns(
 
 @pytest.mark.parametrize(("ppm", "slop"), [(10_000, "20ms"), (20_000, "20ms"), (1000, "20ms"), (200, "5ms")])
 @pytest.mark.parametrize("seed", range(chosen(short=2, long=8)))
-@pytest.mark.long
 def test_a_clock_that_drifts_is_named_however_late_the_rig_starts(seed, ppm, slop):
     assert a_rig_that_starts_late(random.Random(seed), ppm=ppm, slop=slop).codes == {"clock_drift"}
 
@@ -86,7 +87,6 @@ def test_who_was_killed_and_comes_back_is_not_blamed(seed):
     ("ahead_s", "code"), [(-3, "other_clock"), (3, "other_clock"), (-0.45, "over_slop"), (0.06, "over_slop")]
 )
 @pytest.mark.parametrize("seed", range(chosen(short=3, long=10)))
-@pytest.mark.long
 def test_who_comes_back_with_another_clock_is_blamed_for_that_alone(seed, ahead_s, code):
     told = a_lidar_that_returns(random.Random(seed), within=(0.3, 8), ahead_s=ahead_s)
     assert told.codes - {"no_publisher"} == {code}

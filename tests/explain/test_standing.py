@@ -18,6 +18,8 @@ from syncrelay.sync.counts import InputCounts
 from tests.explain.scenario import BEGAN, S, Source, Told, run
 from tests.faults.extent import IS_LONG
 
+pytestmark = pytest.mark.long
+
 _SECONDS = 110
 # By then the start is over, and the pace of an input is known of which a part is not sent.
 _SETTLED = 45

@@ -113,6 +113,7 @@ def test_no_slop_that_would_pair_wrong_frames_is_suggested():
     assert_cured(cured, offered=2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("delay_ms", chosen(short=[80, 250], long=[30, 80, 100, 180, 250]))
 def test_a_constant_latency_is_no_constant_offset(delay_ms):
     camera = replace(CAMERA, delay_ms=delay_ms, delay_jitter_ms=3)
@@ -152,6 +153,7 @@ def test_no_slop_is_suggested_where_a_partner_is_missing():
     assert all("`slop" not in line.text for line in told.warnings)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("after", chosen(short=[3, 9.5], long=[0, 3, 8, 9.5]))
 @pytest.mark.parametrize("hz", chosen(short=[1, 30], long=[1, 5, 30]))
 def test_a_rig_that_starts_one_by_one_has_no_few_sets(hz, after):
