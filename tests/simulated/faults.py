@@ -399,7 +399,7 @@ def namesake(world: World, _: str, __: float) -> End:
     return participant.leave
 
 
-@_kind("group", names="refused_by_dds incompatible_qos no_publisher silent")
+@_kind("group", names="refused_by_dds incompatible_qos no_publisher silent bursts")
 def refuse_subscriptions(world: World, target: str, _: float) -> End:
     """DDS makes nothing more, on any topic, and the group's sensors come back with another reliability."""
     world.refused_everywhere = "no memory"

@@ -98,6 +98,8 @@ class Plan:
     lag_ms: float = 0.0
     latency_ms: float = 1.0
     discovery_ms: float = 100.0
+    missed: float = 0.0
+    """How often a participant that joins is found only by the next announcement."""
     watched: bool = False
     """Whether the relay runs with --watch."""
 
@@ -118,7 +120,8 @@ class Plan:
         groups = "\n".join(f"  {each.name}: {each.in_file()}" for each in self.groups)
         sensors = "\n".join(f"  {each}" for each in self.sensors)
         odd = {
-            key: getattr(self, key) for key in ("node", "eagerness", "lag_ms", "latency_ms", "discovery_ms", "watched")
+            key: getattr(self, key)
+            for key in ("node", "eagerness", "lag_ms", "latency_ms", "discovery_ms", "missed", "watched")
         }
         return f"{self.length:.0f} s at {self.hz:g} Hz, {odd}\n{sensors}\n{groups}\n{steps}"
 
@@ -180,6 +183,7 @@ def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
         lag_ms=chance.choice([0.0, 0.0, 20.0]),
         latency_ms=chance.choice([0.2, 1.0, 10.0]),
         discovery_ms=chance.choice([20.0, 100.0, 900.0]),
+        missed=chance.choice([0.0, 0.0, 0.3]),
         watched=chance.random() < 0.3,
     )
     steps = tuple(sorted(_steps(chance, plan, kinds, chaotic=chaotic)))

@@ -236,7 +236,9 @@ class World:
         self.sim_offset = -self.began
         self.sim_stopped: int | None = None
         self.random: Random = self.scheduler.stream("world")
-        weather = Weather(discovery=round(plan.discovery_ms * MS), latency=round(plan.latency_ms * MS))
+        weather = Weather(
+            discovery=round(plan.discovery_ms * MS), latency=round(plan.latency_ms * MS), missed=plan.missed
+        )
         self.bus = Bus(self.scheduler, weather)
         self.outputs = {
             f"/{group.name}{topic}": (group.name, index)
