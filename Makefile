@@ -12,7 +12,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Where an image sets it, each process that the tests start would compile all modules of this tree again: 0.06 to 0.2 s.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-fast simulate test-kilted test-container test-workspace test-fleet test-lerobot test-release test-bare test-cost faults soak lint schema reference docs bench wheel release clean
+.PHONY: demo test test-fast simulate mutants test-kilted test-container test-workspace test-fleet test-lerobot test-release test-bare test-cost faults soak lint schema reference docs bench wheel release clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -79,6 +79,10 @@ soak: $(VENV)/test
 # hold; docs/explanation/simulator.md says more. A failure prints its seed and the smallest world that still fails.
 simulate: $(VENV)/test
 	$(BIN)/python -m tests.simulated --seed $(or $(SEED),1) --hours $(or $(HOURS),10) $(ARGS)
+
+# Puts one small fault after the other into the package, and looks whether the tests notice; it prints those that live.
+mutants: $(VENV)/test
+	$(BIN)/python -m tests.mutants $(if $(ROOMS),--rooms $(ROOMS)) --sample $(or $(SAMPLE),200) --seed $(or $(SEED),1) $(ARGS)
 
 lint: $(VENV)/lint
 	$(BIN)/ruff check .

@@ -26,9 +26,11 @@ _SPAN_MS = 180_000
 LOOKS_S = (3, 6, 15, 45)
 
 
-def _now(topic: str, *, period_ms: int, after_ms: int = 0, is_stamped: bool = True) -> list[Frame]:
-    """Vectors sent from now on, each stamped as it is sent, or not at all."""
-    begin = time.time_ns()
+def _now(
+    topic: str, *, period_ms: int, after_ms: int = 0, is_stamped: bool = True, begin: int | None = None
+) -> list[Frame]:
+    """Vectors sent from now on, or from `begin`, each stamped as it is sent, or not at all."""
+    begin = begin or time.time_ns()
     sent = [begin + (n + after_ms) * _MS for n in range(0, _SPAN_MS, period_ms)]
     return [Frame(topic, VECTOR, at, vector(at if is_stamped else 0)) for at in sent]
 
@@ -56,11 +58,14 @@ def test_what_it_writes_is_in_order_and_gives_sets_of_that_graph(stage: Stage):
     lossy = stage.player({"/imu": VECTOR, "/log": STRING}, reliability="best_effort")
     reliable.is_up()
     lossy.is_up()
-    reliable.start(merged(_now("/camera", period_ms=50), _now("/lidar", period_ms=100, after_ms=12)), speed=1)
-    words = [
-        Frame("/log", STRING, time.time_ns() + n * 100 * _MS, serialize(STRING, "x")) for n in range(_SPAN_MS // 100)
-    ]
-    lossy.start(merged(_now("/imu", period_ms=20), words), speed=1)
+    # Made first: on a busy machine, what is made between the two starts would set the second behind the first.
+    begin = time.time_ns()
+    lidar = _now("/lidar", period_ms=100, after_ms=12, begin=begin)
+    vectors = merged(_now("/camera", period_ms=50, begin=begin), lidar)
+    words = [Frame("/log", STRING, begin + n * 100 * _MS, serialize(STRING, "x")) for n in range(_SPAN_MS // 100)]
+    others = merged(_now("/imu", period_ms=20, begin=begin), words)
+    reliable.start(vectors, speed=1)
+    lossy.start(others, speed=1)
     written = stage.folder / "new.yaml"
     left_out = f"syncrelay: left out: /log ({STRING}): its type has no header, so no stamp to match by"
     done = _init_of_all(stage, written, "/camera", "/lidar", "/imu", said=left_out)
