@@ -2,9 +2,9 @@
 
     python -m tests.old_faults [NAME ...] [--minutes 10] [--jobs 1] [--seed 1]
 
-Each fault is a patch in this folder, which says what a user saw, and the commit that mended it. NAME is a part of its
-name. Worlds are played from a random seed on, or from --seed, until one breaks a promise or the minutes of CPU are
-over. Exits with 1 where a fault is not found.
+Each fault is a patch in this folder, which says what a user saw, and the commit that mended it, or that guards against
+it. NAME is a part of its name. Worlds are played from a random seed on, or from --seed, until one breaks a promise or
+the minutes of CPU are over. Exits with 1 where a fault is not found.
 """
 
 import argparse
