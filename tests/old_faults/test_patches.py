@@ -18,7 +18,7 @@ def test_every_patch_applies():
 
 
 @pytest.mark.parametrize("patch", PATCHES, ids=lambda patch: patch.stem)
-def test_every_patch_says_what_a_user_saw_and_which_commit_mended_it(patch):
+def test_every_patch_says_what_a_user_saw_and_which_commit_holds_it_off(patch):
     saw, mended, *_ = patch.read_text().splitlines()
     assert re.fullmatch(r"# .+\.", saw)
-    assert re.fullmatch(r"# Mended by [0-9a-f]{8} \(.+\)\.", mended)
+    assert re.fullmatch(r"# (Mended by|Guarded against since) [0-9a-f]{8} \(.+\)\.", mended)
