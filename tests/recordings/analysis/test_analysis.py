@@ -104,11 +104,8 @@ def _analyzed(streams, text):
     return analyze_group(group_of(text, "front"), tuple(streams), text)
 
 
-_POLICIES = ("approximate_time", "approximate_time_eager", "approximate_epsilon_time")
-
-
-@pytest.mark.parametrize("policy", _POLICIES)
 @given(
+    policy=st.sampled_from(("approximate_time", "approximate_time_eager", "approximate_epsilon_time")),
     keys=st.fixed_dictionaries(
         {"slop": st.integers(0, 20), "queue_size": st.integers(1, 12), "every": st.integers(1, 3)}
     ),

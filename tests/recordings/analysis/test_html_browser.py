@@ -83,8 +83,21 @@ def _opened(browser, path: Path, *, scheme: str = "light", width: int = 1200) ->
         yield report
 
 
-@pytest.mark.parametrize("width", [360, 1200])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.fixture(scope="module")
+def shared(browser, report) -> Iterator[Opened]:
+    with _opened(browser, report) as page:
+        yield page
+
+
+@pytest.fixture
+def seen(shared) -> Opened:
+    """The report with all of the recording in view."""
+    shared.page.locator(".lanes").focus()
+    shared.page.keyboard.press("0")
+    return shared
+
+
+@pytest.mark.parametrize(("scheme", "width"), [("light", 360), ("dark", 1200)])
 def test_everything_is_drawn_without_a_complaint_or_a_request(scheme, width, browser, report):
     with _opened(browser, report, scheme=scheme, width=width) as opened:
         drawn = opened.page.evaluate(_DRAWN)
@@ -125,21 +138,19 @@ def test_of_many_pairs_the_farthest_apart_are_seen_first_and_the_rest_is_drawn_w
         assert page.locator(".wide").evaluate_all("all => all.every((each) => each.scrollWidth <= each.clientWidth)")
 
 
-def test_a_change_of_scheme_is_drawn_at_once(browser, report):
-    with _opened(browser, report) as opened:
-        light = opened.page.evaluate("colour('matched')")
-        opened.page.emulate_media(color_scheme="dark")
-        opened.page.wait_for_function(_HAS_COLOUR, arg=[".lanes", "matched"])
-        assert opened.page.evaluate("colour('matched')") != light
+def test_a_change_of_scheme_is_drawn_at_once(seen):
+    light = seen.page.evaluate("colour('matched')")
+    seen.page.emulate_media(color_scheme="dark")
+    seen.page.wait_for_function(_HAS_COLOUR, arg=[".lanes", "matched"])
+    assert seen.page.evaluate("colour('matched')") != light
 
 
-def test_the_tables_hold_the_figures_of_the_json(browser, report, analysis):
+def test_the_tables_hold_the_figures_of_the_json(seen, analysis):
     told = json.loads(json.dumps(as_json("drive.mcap", analysis)))
     (group,) = told["groups"]
-    with _opened(browser, report) as opened:
-        fates = [head.strip() for head in opened.page.locator(".fates thead th").all_text_contents()]
-        rows = [row.split() for row in opened.page.locator(".fates tbody tr").all_inner_texts()]
-        cells = opened.page.locator("#topics ~ .wide tbody tr td:nth-child(3)").all_text_contents()
+    fates = [head.strip() for head in seen.page.locator(".fates thead th").all_text_contents()]
+    rows = [row.split() for row in seen.page.locator(".fates tbody tr").all_inner_texts()]
+    cells = seen.page.locator("#topics ~ .wide tbody tr td:nth-child(3)").all_text_contents()
     assert [int(cell) for cell in cells] == [topic["messages"] for topic in told["topics"]]
     for row, expected in zip(rows, group["inputs"], strict=True):
         counts = dict(zip(fates[1:-1], map(int, row[1:-1]), strict=True))
@@ -151,87 +162,80 @@ def test_the_tables_hold_the_figures_of_the_json(browser, report, analysis):
         assert all(count <= expected["dropped"].get(fate, 0) for fate, count in counts.items())
 
 
-def test_what_is_drawn_of_each_lane_adds_up(browser, report, analysis):
-    with _opened(browser, report) as opened:
-        drawn = opened.page.evaluate(
-            "async () => { const {groups} = JSON.parse(document.getElementById('drawings').textContent);"
-            " const {lanes} = await unpackTimeline(groups[0].timeline);"
-            " return lanes.map(({fates}) => [fates.length, fates.filter((fate) => fate === MATCHED).length]); }"
-        )
+def test_what_is_drawn_of_each_lane_adds_up(seen, analysis):
+    drawn = seen.page.evaluate(
+        "async () => { const {groups} = JSON.parse(document.getElementById('drawings').textContent);"
+        " const {lanes} = await unpackTimeline(groups[0].timeline);"
+        " return lanes.map(({fates}) => [fates.length, fates.filter((fate) => fate === MATCHED).length]); }"
+    )
     assert drawn == [[counts.fed, counts.matched] for counts in analysis.groups[0].evaluation.counts]
 
 
-def test_keys_move_zoom_and_step_through_what_went_into_no_set(browser, report):
-    with _opened(browser, report) as opened:
-        lanes, keyboard = opened.page.locator(".lanes"), opened.page.keyboard
-        lanes.focus()
-        begin, end = opened.shown()
-        keyboard.press("+")
-        closer = opened.shown()
-        assert closer[1] - closer[0] == pytest.approx((end - begin) / 2)
-        keyboard.press("ArrowRight")
-        assert opened.shown()[0] == pytest.approx(closer[0] + (closer[1] - closer[0]) / 4)
-        keyboard.press("0")
-        assert opened.shown()[1] - opened.shown()[0] > 29
-        keyboard.press("n")
-        first = opened.told()
-        assert "no set, " in first
-        keyboard.press("n")
-        assert opened.told() != first
-        keyboard.press("p")
-        assert opened.told() == first
+def test_keys_move_zoom_and_step_through_what_went_into_no_set(seen):
+    keyboard = seen.page.keyboard
+    begin, end = seen.shown()
+    assert end - begin > 29
+    keyboard.press("+")
+    closer = seen.shown()
+    assert closer[1] - closer[0] == pytest.approx((end - begin) / 2)
+    keyboard.press("ArrowRight")
+    assert seen.shown()[0] == pytest.approx(closer[0] + (closer[1] - closer[0]) / 4)
+    keyboard.press("0")
+    assert seen.shown() == [begin, end]
+    keyboard.press("n")
+    first = seen.told()
+    assert "no set, " in first
+    keyboard.press("n")
+    assert seen.told() != first
+    keyboard.press("p")
+    assert seen.told() == first
 
 
-def test_buttons_do_the_same_and_are_reached_by_tab(browser, report):
-    with _opened(browser, report) as opened:
-        before = opened.shown()
-        opened.page.get_by_role("button", name="Zoom in").focus()
-        opened.page.keyboard.press("Enter")
-        assert opened.shown() != before
-        opened.page.keyboard.press("Tab")
-        assert opened.page.evaluate("document.activeElement.textContent") == "Zoom out"
-        opened.page.keyboard.press("Enter")
-        assert opened.shown() == pytest.approx(before)
+def test_buttons_do_the_same_and_are_reached_by_tab(seen):
+    before = seen.shown()
+    seen.page.get_by_role("button", name="Zoom in").focus()
+    seen.page.keyboard.press("Enter")
+    assert seen.shown() != before
+    seen.page.keyboard.press("Tab")
+    assert seen.page.evaluate("document.activeElement.textContent") == "Zoom out"
+    seen.page.keyboard.press("Enter")
+    assert seen.shown() == pytest.approx(before)
 
 
-def test_dragging_over_the_whole_shows_that_part(browser, report):
-    with _opened(browser, report) as opened:
-        over = opened.page.locator(".overview .u-over")
-        over.scroll_into_view_if_needed()
-        box = over.bounding_box()
-        mouse, middle = opened.page.mouse, box["y"] + box["height"] / 2
-        mouse.move(box["x"] + box["width"] * 0.25, middle)
-        mouse.down()
-        mouse.move(box["x"] + box["width"] * 0.5, middle, steps=4)
-        mouse.up()
-        low, high = opened.shown()
-        assert (low, high) == (pytest.approx(7.5, abs=0.5), pytest.approx(15, abs=0.5))
+def test_dragging_over_the_whole_shows_that_part(seen):
+    over = seen.page.locator(".overview .u-over")
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
+    mouse, middle = seen.page.mouse, box["y"] + box["height"] / 2
+    mouse.move(box["x"] + box["width"] * 0.25, middle)
+    mouse.down()
+    mouse.move(box["x"] + box["width"] * 0.5, middle, steps=4)
+    mouse.up()
+    assert seen.shown() == [pytest.approx(7.5, abs=0.5), pytest.approx(15, abs=0.5)]
 
 
-def test_pointing_at_a_message_tells_what_became_of_it(browser, report):
-    with _opened(browser, report) as opened:
-        lanes = opened.page.locator(".lanes .u-over")
-        lanes.scroll_into_view_if_needed()
-        box = lanes.bounding_box()
-        for step in range(40):
-            opened.page.mouse.move(box["x"] + 300 + step * 8, box["y"] + 10)
-            if "in a set of span" in opened.told():
-                break
-        assert opened.told().startswith(f"{TOPICS[0]} at ")
-        assert "in a set of span" in opened.told()
+def test_pointing_at_a_message_tells_what_became_of_it(seen):
+    lanes = seen.page.locator(".lanes .u-over")
+    lanes.scroll_into_view_if_needed()
+    box = lanes.bounding_box()
+    for step in range(40):
+        seen.page.mouse.move(box["x"] + 300 + step * 8, box["y"] + 10)
+        if "in a set of span" in seen.told():
+            break
+    assert seen.told().startswith(f"{TOPICS[0]} at ")
+    assert "in a set of span" in seen.told()
 
 
-def test_all_that_is_drawn_has_words(browser, report):
-    with _opened(browser, report) as opened:
-        nameless = opened.page.evaluate(
-            "() => [...document.querySelectorAll('[role=img], [role=group], [role=region], .chart')]"
-            ".filter((each) => !each.getAttribute('aria-label')).length"
-        )
-        assert nameless == 0
-        for name in ("Zoom in", "Earlier", "Next unmatched"):
-            assert opened.page.get_by_role("button", name=name).count() == 1
-        assert opened.page.get_by_role("img", name="/camera: 300 received").count() == 1
-        assert opened.page.get_by_role("group", name="Messages and sets of fused").count() == 1
+def test_all_that_is_drawn_has_words(seen):
+    nameless = seen.page.evaluate(
+        "() => [...document.querySelectorAll('[role=img], [role=group], [role=region], .chart')]"
+        ".filter((each) => !each.getAttribute('aria-label')).length"
+    )
+    assert nameless == 0
+    for name in ("Zoom in", "Earlier", "Next unmatched"):
+        assert seen.page.get_by_role("button", name=name).count() == 1
+    assert seen.page.get_by_role("img", name="/camera: 300 received").count() == 1
+    assert seen.page.get_by_role("group", name="Messages and sets of fused").count() == 1
 
 
 def test_names_from_strangers_run_nothing(browser, folder, analysis):

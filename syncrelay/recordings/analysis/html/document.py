@@ -3,6 +3,7 @@
 import hashlib
 from base64 import b64encode
 from datetime import UTC, datetime
+from functools import cache
 from importlib.resources import files
 from typing import Any, Final
 
@@ -74,6 +75,7 @@ def _file(analysis: Analysis) -> str:
         return f"# {error}"
 
 
+@cache
 def _template(name: str) -> Any:
     """Return a template. It escapes all it is given, as recordings come from strangers, and refuses unknown names."""
     environment = Environment(
