@@ -7,8 +7,8 @@ import pytest
 
 from syncrelay.config import load_text
 from syncrelay.explain.dry_run import EngineDriver
-from syncrelay.sync import Match, Message, Ticks
-from tests.ros.cdr_messages import CLOCK, VECTOR, serialize, stamps_of, time, vector
+from syncrelay.sync import Match, Message
+from tests.ros.cdr_messages import VECTOR, stamps_of, vector
 from tests.ros.configs import LOSSLESS, config, inputs, outputs
 from tests.ros.frames import Frame
 from tests.ros.manifests import MANIFEST_TYPE, Told, read
@@ -90,24 +90,3 @@ def test_live_sets_are_those_that_the_engine_gives_of_what_arrived_when_it_did(s
     assert len(live) == 30
     sent = stamps_of(collector.payloads(_OUT[0]))
     assert [stamp for stamp in sent if begin <= stamp < end] == sorted(live)
-
-
-def test_with_use_sim_time_ticks_are_those_of_the_simulated_clock(stage: Stage):
-    text = config({"front": _GROUP}, node={"use_sim_time": True})
-    collector = stage.collector(_TOLD)
-    stage.relay(text)
-    player = stage.player({**_PAIR, "/clock": CLOCK})
-    player.match()
-
-    def steps():
-        # A simulation that began a while ago: of no tick of its time is this machine's clock.
-        for now in itertools.count(1000 * _SECOND, 50 * MS):
-            clock = Frame("/clock", CLOCK, 0, serialize(CLOCK, time(now)))
-            yield [*(_frame(topic, now - 20 * MS) for topic in _PAIR), clock]
-
-    play_until_out(player, collector, steps(), _TOLD)
-    told = _told(collector)[0]
-    tick = _tick(told)
-    assert 1000 * _SECOND <= tick < 2000 * _SECOND
-    assert Ticks(30).at(Ticks(30).last_until(tick)) == tick
-    assert all(stamp is not None and tick - _SECOND <= stamp <= tick for stamp in _stamps(told))

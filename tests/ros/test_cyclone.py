@@ -2,7 +2,6 @@
 
 import json
 import random
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,10 +14,10 @@ import pytest
 
 from tests.faults.extent import chosen
 from tests.ros import frames
-from tests.ros.cdr_messages import NS_PER_SECOND, STORE, STRING, VECTOR, padded, stamp_of, vector
+from tests.ros.cdr_messages import NS_PER_SECOND, STORE, STRING, VECTOR, padded, vector
 from tests.ros.configs import config, inputs, outputs
 from tests.ros.frames import Frame
-from tests.ros.processes import Process, wait_until
+from tests.ros.processes import wait_until
 from tests.ros.stage import Collector, Stage
 from tests.ros.status import ANY_PORT, findings, problems, wait_for_finding
 from tests.ros.streams import BEGIN, MS
@@ -29,8 +28,6 @@ pytest.importorskip("cyclonedds", reason="cyclonedds is not installed: it is in 
 from rosbags.interfaces import Nodetype
 
 pytestmark = pytest.mark.ros
-
-_NAMELESS = "a publisher that uses DDS without ROS"
 
 
 class Peer(Collector):
@@ -350,41 +347,3 @@ def _all_qos(*, manual: str) -> Iterator[dict[str, Any]]:
         keys = {"liveliness_lease_duration": lease, "deadline": deadline}
         named = {"reliability": reliability, "durability": durability, "liveliness": liveliness}
         yield named | {key: value for key, value in keys.items() if value is not None}
-
-
-def test_a_lazy_group_wakes_for_cyclone_and_outlives_its_deaths(stage: Stage):
-    pair, out = _pair("front"), _out("front")
-    group = {"policy": "exact_time", "lazy": True, "topics": inputs(pair)}
-    relay = stage.relay(config({"front": group}, metrics=ANY_PORT))
-    reader = Peer(stage, "reader")
-    first = _moments("front", number=4000)
-    for life in range(chosen(short=2, long=20)):
-        writer = Peer(stage, f"writer-{life}")
-        writer.write(pair)
-        writer.play(first[life * 200 :], how="begin")
-        wait_for_finding(relay, "nobody_listens")
-        assert [writer.matched(topic) for topic in pair] == [0, 0]
-        reader.read(out)
-        before = reader.count(next(iter(out)))
-        for output in out:
-            received = reader.wait_for(output, before + 20)
-            stamps = [stamp_of(each) for each in received[before:]]
-            assert stamps == sorted(set(stamps))
-        assert not problems(relay, "front") & {"incompatible_qos", "no_publisher", "alone"}
-        if life % 2:
-            # In order; the relay is not told of a subscriber that is killed, so that ends in order always.
-            reader.do("end", topics=list(out))
-            wait_until(lambda writer=writer: not writer.matched("/front/left"), "the group to sleep")
-            writer.process.ask_to_end()
-            writer.process.wait()
-        else:
-            writer.process.send(signal.SIGKILL)
-            wait_for_finding(relay, "no_publisher", naming=["any more"])
-            reader.do("end", topics=list(out))
-    _assert_in_order(relay)
-
-
-def _assert_in_order(relay: Process) -> None:
-    assert relay.running()
-    assert "Traceback" not in relay.stderr
-    assert "BARE_DDS" not in relay.stderr

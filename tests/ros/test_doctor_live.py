@@ -12,8 +12,7 @@ import pytest
 
 from tests import preloaded
 from tests.doctor.environments import unshared
-from tests.ros.cdr_messages import CLOCK, IMAGE, VECTOR, serialize, vector
-from tests.ros.cdr_messages import time as ros_time
+from tests.ros.cdr_messages import IMAGE, VECTOR, vector
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
 from tests.ros.processes import ours_of
@@ -94,18 +93,22 @@ def topics_of(report):
     return [topic for group in report["groups"] for topic in group["inputs"]]
 
 
-def test_topics_that_arrive_are_shown_with_rate_and_lag_and_nothing_is_wrong(stage: Stage):
-    player = stage.player({"/camera": VECTOR, "/lidar": VECTOR})
+def test_topics_that_arrive_are_shown_by_their_names_after_remaps_with_rate_and_lag_and_nothing_is_wrong(stage: Stage):
+    player = stage.player({"/robot1/camera": VECTOR, "/points": VECTOR})
     player.is_up()
-    player.start(merged(now("/camera"), now("/lidar", behind_s=0.3)), speed=1)
+    player.start(merged(now("/robot1/camera"), now("/points", behind_s=0.3)), speed=1)
     # The file leaves out a type, which the graph has.
-    topics = [{"topic": "/camera"}, *inputs({"/lidar": VECTOR})]
+    topics = [{"topic": "camera"}, *inputs({"/lidar": VECTOR})]
     text = config({"front": {"policy": "approximate_time", "slop": "1s", "topics": topics}})
-    _, problems, report, _ = examine(stage, text, until=all_arrives)
+    remaps = ["--ros-args", "-r", "__ns:=/robot1", "-r", "__node:=fusion", "-r", "fusion:/lidar:=/points"]
+    _, problems, report, _ = examine(stage, text, *remaps, until=all_arrives)
     assert problems == []
     assert "not_checked" in codes(report["diagnoses"])
     camera, lidar = topics_of(report)
-    assert [(each["topic"], each["type"]) for each in (camera, lidar)] == [("/camera", VECTOR), ("/lidar", VECTOR)]
+    assert [(each["topic"], each["type"]) for each in (camera, lidar)] == [
+        ("/robot1/camera", VECTOR),
+        ("/points", VECTOR),
+    ]
     assert camera["publishers"] == [{"node": "/player", "type": VECTOR, "mismatch": None}]
     assert camera["received"] > 0
     assert lidar["lag_ms"] - camera["lag_ms"] > 100
@@ -185,75 +188,3 @@ def test_nodes_of_another_user_are_told_from_nodes_that_are_not_there(stage: Sta
     assert {"alone", "silent", "no_publisher"}.isdisjoint(said)
     nodes = {each["node"] for topic in topics_of(examined.report) for each in topic["publishers"]}
     assert nodes == {"a publisher whose node is not known yet"}
-
-
-def test_without_a_file_it_says_who_is_there(stage: Stage):
-    stage.player({"/camera": VECTOR}, node="usb_cam").is_up()
-    for look_s in longer(3):
-        argv = [sys.executable, "-m", "syncrelay", "doctor", "--json", "--live", "--seconds", f"{look_s}"]
-        report = run(argv, stage.environment).report
-        # A publisher is found before the name of its node.
-        if report["graph"]["nodes"] and report["graph"]["n_topics"]:
-            break
-    assert (report["graph"]["nodes"], report["graph"]["n_topics"]) == (["/usb_cam"], 1)
-    assert report["groups"] == []
-
-
-def test_simulated_time_is_no_fault_and_one_that_is_not_used_is_told(stage: Stage):
-    player = stage.player({"/camera": VECTOR, "/lidar": VECTOR, "/clock": CLOCK})
-    player.is_up()
-    frames = merged(now("/camera", behind_s=500_000), now("/lidar", behind_s=500_000))
-    ticks = [
-        Frame("/clock", CLOCK, frame.time, serialize(CLOCK, ros_time(frame.time - 500_000 * S))) for frame in frames
-    ]
-    player.start(merged(frames, ticks), speed=1)
-    groups = {"front": {**group("/camera", "/lidar", policy="approximate_time"), "slop": "1s"}}
-    _, problems, *_ = examine(stage, config(groups, node={"use_sim_time": True}), until=all_arrives)
-    _, wall_problems, off_clock, _ = examine(
-        stage,
-        config(groups),
-        until=lambda seen: all_arrives(seen) and "clock_unused" in codes(seen.report["diagnoses"]),
-    )
-    assert (problems, wall_problems) == ([], [])
-    assert "clock_unused" in codes(off_clock["diagnoses"])
-
-
-def test_a_relay_of_the_same_name_is_seen_and_is_told_nothing_of_the_look(stage: Stage):
-    text = config({"front": group("/camera", "/lidar")})
-    relay = stage.relay(text)
-    relay.wait_for_log("waiting for")
-    _, problems, report, _ = examine(
-        stage, text, until=lambda seen: {"node_name", "no_publisher"} <= set(codes(seen.report["diagnoses"]))
-    )
-    assert "no_publisher" in codes(problems)
-    assert not {"alone", "output_taken"} & set(codes(problems))
-    assert "node_name" in codes(report["diagnoses"])
-    assert report["graph"]["nodes"] == ["/syncrelay"]
-
-
-def test_names_are_those_after_remaps_also_of_remaps_for_the_relays_node(stage: Stage):
-    player = stage.player({"/robot1/camera": VECTOR, "/points": VECTOR})
-    player.is_up()
-    player.start(merged(now("/robot1/camera"), now("/points")), speed=1)
-    remaps = ["--ros-args", "-r", "__ns:=/robot1", "-r", "__node:=fusion", "-r", "fusion:/lidar:=/points"]
-    text = config({"front": {**group("camera", "/lidar", policy="approximate_time"), "slop": "1s"}})
-    _, problems, report, _ = examine(stage, text, *remaps, until=all_arrives)
-    assert problems == []
-    assert [topic["topic"] for topic in topics_of(report)] == ["/robot1/camera", "/points"]
-
-
-def test_several_topics_in_another_namespace_are_named_with_it_and_not_the_outputs_of_a_relay(stage: Stage):
-    player = stage.player({"/robot1/camera": VECTOR, "/robot1/imu": VECTOR})
-    player.is_up()
-    player.start(merged(now("/robot1/camera"), now("/robot1/imu")), speed=1)
-    stage.relay(config({"front": group("/robot1/camera", "/robot1/imu")}, diagnostics=None))
-    _, problems, *_ = examine(
-        stage,
-        config({"front": group("/camera", "/imu")}),
-        # Those of the player, the relay's outputs and its manifest.
-        until=lambda seen: seen.report["graph"]["n_topics"] == 5 and len(seen.problems) == 1,
-    )
-    (found,) = problems
-    assert found["code"] == "no_publisher"
-    assert all(name in found["what"] for name in ("front: ", "/camera", "/imu"))
-    assert all(name in found["fix"] for name in ("/robot1/camera", "/robot1/imu"))

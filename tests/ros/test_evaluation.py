@@ -52,24 +52,15 @@ def _evaluated_next(relay):
     return [name for name, seen in _evaluated_at(relay).items() if seen != before.get(name)]
 
 
-def test_of_many_groups_some_are_evaluated_at_a_time_and_none_is_left_out(relay_of):
-    relay = relay_of(_GROUPS)
-    assert len(_evaluated_next(relay)) == _GROUPS
-    evaluated = [_evaluated_next(relay) for _ in range(6)]
-    assert [len(names) for names in evaluated] == [10] * 6
-    for names in zip(*[iter(evaluated)] * 2, strict=True):
-        assert set().union(*names) == set(_evaluated_at(relay))
-
-
-def test_of_very_many_none_waits_for_more_than_four_evaluations(relay_of):
-    relay = relay_of(61)
-    _evaluated_next(relay)
-    assert set().union(*(_evaluated_next(relay) for _ in range(4))) == set(_evaluated_at(relay))
-
-
-def test_a_few_are_evaluated_every_time(relay_of):
-    relay = relay_of(10)
-    assert [len(_evaluated_next(relay)) for _ in range(3)] == [10] * 3
+@pytest.mark.parametrize(("n_groups", "at_a_time", "turns"), [(10, 10, 1), (_GROUPS, 10, 2), (61, 16, 4)])
+def test_all_of_a_few_and_some_of_many_are_evaluated_at_a_time_and_none_is_left_out(
+    relay_of, n_groups, at_a_time, turns
+):
+    relay = relay_of(n_groups)
+    assert len(_evaluated_next(relay)) == n_groups
+    evaluated = [_evaluated_next(relay) for _ in range(turns)]
+    assert [len(names) for names in evaluated] == [at_a_time] * turns
+    assert set().union(*evaluated) == set(_evaluated_at(relay))
 
 
 def test_whoever_asks_for_the_state_sees_all_as_they_are(relay_of, monkeypatch):

@@ -14,7 +14,7 @@ from tests import preloaded
 from tests.ros.cdr_messages import STRING, VECTOR, serialize, vector
 from tests.ros.frames import Frame
 from tests.ros.processes import ours_of
-from tests.ros.stage import Stage, both_backends
+from tests.ros.stage import Stage
 from tests.ros.streams import merged
 
 pytestmark = pytest.mark.ros
@@ -26,13 +26,10 @@ _SPAN_MS = 180_000
 LOOKS_S = (3, 6, 15, 45)
 
 
-def _now(
-    topic: str, *, period_ms: int, after_ms: int = 0, is_stamped: bool = True, begin: int | None = None
-) -> list[Frame]:
-    """Vectors sent from now on, or from `begin`, each stamped as it is sent, or not at all."""
-    begin = begin or time.time_ns()
+def _sent(topic: str, *, period_ms: int, begin: int, after_ms: int = 0) -> list[Frame]:
+    """Vectors sent from then on, each stamped as it is sent."""
     sent = [begin + (n + after_ms) * _MS for n in range(0, _SPAN_MS, period_ms)]
-    return [Frame(topic, VECTOR, at, vector(at if is_stamped else 0)) for at in sent]
+    return [Frame(topic, VECTOR, at, vector(at)) for at in sent]
 
 
 def _init(stage: Stage, *words: str) -> subprocess.CompletedProcess[str]:
@@ -52,7 +49,6 @@ def _init_of_all(stage: Stage, written: Path, *topics: str, said: str = "") -> s
     return done
 
 
-@both_backends
 def test_what_it_writes_is_in_order_and_gives_sets_of_that_graph(stage: Stage):
     reliable = stage.player({"/camera": VECTOR, "/lidar": VECTOR})
     lossy = stage.player({"/imu": VECTOR, "/log": STRING}, reliability="best_effort")
@@ -60,10 +56,10 @@ def test_what_it_writes_is_in_order_and_gives_sets_of_that_graph(stage: Stage):
     lossy.is_up()
     # Made first: on a busy machine, what is made between the two starts would set the second behind the first.
     begin = time.time_ns()
-    lidar = _now("/lidar", period_ms=100, after_ms=12, begin=begin)
-    vectors = merged(_now("/camera", period_ms=50, begin=begin), lidar)
+    lidar = _sent("/lidar", period_ms=100, after_ms=12, begin=begin)
+    vectors = merged(_sent("/camera", period_ms=50, begin=begin), lidar)
     words = [Frame("/log", STRING, begin + n * 100 * _MS, serialize(STRING, "x")) for n in range(_SPAN_MS // 100)]
-    others = merged(_now("/imu", period_ms=20, begin=begin), words)
+    others = merged(_sent("/imu", period_ms=20, begin=begin), words)
     reliable.start(vectors, speed=1)
     lossy.start(others, speed=1)
     written = stage.folder / "new.yaml"
@@ -100,24 +96,6 @@ def test_an_empty_graph_is_named(stage: Stage):
         "syncrelay: no two topics of 1 s of the graph have stamps and at least 10 messages"
     )
     assert "nobody publishes anything that can be used here" in done.stderr
-
-
-def test_topics_without_stamps_are_named_with_the_reason(stage: Stage):
-    player = stage.player({"/text": STRING, "/unset": VECTOR})
-    player.is_up()
-    words = [
-        Frame("/text", STRING, time.time_ns() + n * 50 * _MS, serialize(STRING, "x")) for n in range(_SPAN_MS // 50)
-    ]
-    player.start(merged(words, _now("/unset", period_ms=50, is_stamped=False)), speed=1)
-    for seconds in LOOKS_S:
-        done = _init(stage, "--seconds", f"{seconds}")
-        if "with stamp 0" in done.stderr and "/text" in done.stderr:
-            break
-    assert (done.returncode, done.stdout) == (1, "")
-    assert f"/text ({STRING}): its type has no header, so no stamp to match by" in done.stderr
-    (unset,) = (line for line in done.stderr.splitlines() if "/unset" in line)
-    assert unset.endswith(" with stamp 0")
-    assert int(unset.split("messages, ")[1].split()[0]) > 0
 
 
 def test_it_can_be_stopped_while_it_listens(stage: Stage):

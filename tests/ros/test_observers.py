@@ -1,17 +1,15 @@
 """Who only looks publishes nothing, and who relays tells of others that publish the same outputs."""
 
-import signal
 import sys
 
 import pytest
 
 from syncrelay.config import load_text
 from tests.cli.terminals import on_terminal
-from tests.ros.cdr_messages import VECTOR
 from tests.ros.processes import wait_until
 from tests.ros.sensors import PAIR, assert_looked_at_a_healthy_rig, front, play, stream
 from tests.ros.stage import Collector, Stage
-from tests.ros.status import findings, wait_for_finding
+from tests.ros.status import findings
 from tests.ros.streams import MS, merged
 
 pytestmark = pytest.mark.ros
@@ -68,18 +66,3 @@ def test_a_file_is_tried_on_a_terminal_and_one_that_fits_is_written(stage: Stage
     assert [line for line in lines if len(line) > 70 and not line.startswith("    ")] == []
     (group,) = load_text((stage.folder / "new.yaml").read_text()).groups
     assert group.options.model_dump()["slop"] == 7 * MS
-
-
-def test_a_relay_tells_of_a_second_one_and_of_others_that_publish_its_outputs(stage: Stage):
-    relay = stage.relay(front())
-    play(stage, _RIG)
-    wait_for_finding(relay, "healthy")
-    assert "output_taken" not in findings(relay)
-    second = stage.relay(front())
-    wait_for_finding(relay, "output_taken", naming=["/syncrelay", "/front/"])
-    wait_for_finding(second, "output_taken")
-    second.send(signal.SIGTERM)
-    assert second.wait() == 0
-    wait_until(lambda: "output_taken" not in findings(relay), "the end of the second relay to be seen")
-    stage.player({"/front/lidar": VECTOR}, node="bag")
-    wait_for_finding(relay, "output_taken", naming=["/bag", "/front/lidar"])

@@ -15,10 +15,7 @@ from tests.ros.stage import Stage
 
 pytestmark = pytest.mark.ros
 
-_NAMES = {
-    "text": [f"cam\x1b[31mera\n{FORGED}".encode(), b"1bad//", "kaméra".encode(), b"camer a"],
-    "bytes": [b"camer\xff\xfe"],
-}
+_NAMES = (f"cam\x1b[31mera\n{FORGED}".encode(), b"1bad//", "kaméra".encode(), b"camer a", b"camer\xff\xfe")
 
 
 def _publish(stage: Stage, *topics: bytes, namespace: bytes = b"geometry_msgs::msg", name: bytes) -> None:
@@ -27,9 +24,8 @@ def _publish(stage: Stage, *topics: bytes, namespace: bytes = b"geometry_msgs::m
     assert odd.answer() == "up"
 
 
-@pytest.mark.parametrize("names", _NAMES.values(), ids=_NAMES)
-def test_topics_that_ros_refuses_end_nothing_and_hide_nothing(stage: Stage, names):
-    _publish(stage, *names, name=b"Vector3Stamped")
+def test_topics_that_ros_refuses_end_nothing_and_hide_nothing(stage: Stage):
+    _publish(stage, *_NAMES, name=b"Vector3Stamped")
     stage.player({"/camera": VECTOR}).match(0)
     relay = stage.relay(front(inputs({"/camra": VECTOR, "/lidar": VECTOR})))
     assert_logged(relay, r"front: no set for .*/camra.*/lidar")

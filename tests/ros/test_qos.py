@@ -1,25 +1,17 @@
 """QoS: matched to the publishers, or as the file says."""
 
 from dataclasses import replace
-from itertools import combinations_with_replacement, count
+from itertools import combinations_with_replacement
 
 import pytest
 
 from syncrelay.config import AUTO, QosOverrides, QosPreset
-from tests.ros import relaying
-from tests.ros.cdr_messages import VECTOR
-from tests.ros.configs import config, inputs, outputs
-from tests.ros.stage import Collector, Stage, both_backends
-from tests.ros.streams import BEGIN, MS, at, merged
+from tests.ros.streams import MS
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from syncrelay.config.profile import Profile, is_known, matched, mismatch, sent
 
-_PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
-_PAIR_OUT = dict.fromkeys(outputs("front", _PAIR), VECTOR)
-_RECORDING = merged(at("/camera", 0), at("/lidar", 0))
-_TEXT = config({"front": {"policy": "exact_time", "topics": inputs(_PAIR)}})
 _KINDS = [
     Profile(depth=1, reliability=reliability, durability=durability)
     for reliability in ("reliable", "best_effort")
@@ -85,45 +77,3 @@ def test_an_output_of_an_input_that_keeps_all_keeps_the_last_5000():
     assert received.history == "keep_all"
     assert (output.history, output.depth) == ("keep_last", 5000)
     assert mismatch(output, received) is None
-
-
-def _wait_for_qos(collector: Collector, *expected: str) -> None:
-    """Wait until the relay subscribes and publishes with this reliability and durability on all its topics."""
-
-    def shown(topic: str, kind: str) -> list[tuple[str, ...]]:
-        endpoints = collector.endpoints(topic, kind=kind, node="/syncrelay")
-        return [(each["reliability"], each["durability"]) for each in endpoints]
-
-    collector.process.wait_until(
-        lambda: all(
-            shown(topic, "subscription") == shown(output, "publisher") == [expected]
-            for topic, output in zip(_PAIR, _PAIR_OUT, strict=True)
-        ),
-        f"the relay's QoS to be {expected}",
-    )
-
-
-@pytest.mark.ros
-@both_backends
-def test_the_relay_follows_its_publishers_where_one_takes_the_place_of_another(stage: Stage):
-    sets = (relaying.a_set(_RECORDING, BEGIN + n * MS) for n in count())
-    collector = stage.collector(_PAIR_OUT, reliability="best_effort")
-    stage.relay(_TEXT)
-    first = stage.player(_PAIR, reliability="best_effort")
-    relaying.play_until_out(first, collector, sets, _PAIR_OUT)
-    _wait_for_qos(collector, "best_effort", "volatile")
-    first.process.ask_to_end()
-    first.process.wait()
-    second = stage.player(_PAIR, reliability="reliable")
-    _wait_for_qos(collector, "reliable", "volatile")
-    relaying.play_until_out(second, stage.collector(_PAIR_OUT), sets, _PAIR_OUT)
-
-
-@pytest.mark.ros
-def test_a_latched_message_reaches_a_relay_that_starts_later_and_a_subscriber_later_still(stage: Stage):
-    stage.player(_PAIR, durability="transient_local").play(_RECORDING)
-    stage.relay(_TEXT)
-    collector = stage.collector(_PAIR_OUT, durability="transient_local")
-    for frame, output in zip(_RECORDING, _PAIR_OUT, strict=True):
-        assert collector.wait_for(output, 1) == [frame.payload]
-    _wait_for_qos(collector, "reliable", "transient_local")

@@ -8,13 +8,14 @@ from typing import Any, NamedTuple
 import pytest
 
 from syncrelay.sync import ApproximateTime, ExactTime, Policy
+from tests.faults.extent import chosen
 from tests.ros import recordings, relaying
 from tests.ros.cdr_messages import stamp_of
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs, outputs
 from tests.ros.frames import Frame
-from tests.ros.stage import Stage, both_backends
+from tests.ros.stage import BACKEND, BACKENDS, Stage
 
-pytestmark = [pytest.mark.ros, pytest.mark.real_data, both_backends]
+pytestmark = [pytest.mark.ros, pytest.mark.real_data]
 
 _MS = 1_000_000
 
@@ -58,17 +59,18 @@ RGB_DEPTH = Case(
 PICTURES = RGB_DEPTH._replace(name="pictures", read=lambda data, _: recordings.tum_pictures(data), sets=39)
 
 
-@pytest.mark.parametrize(
-    ("cases", "speed"),
-    [
-        ([IMU_MAGNETIC_EXACT, IMU_MAGNETIC, IMU_SCAN], 4),
-        ([RGB_DEPTH], 10),
-        # The husky drove for 395 s.
-        ([FIX_ODOM_IMU], 30),
-        ([PICTURES], 1),
-    ],
-    ids=["three_groups_that_share_topics", "rgb_depth", "fix_odom_imu", "pictures"],
-)
+_PLAYED = {
+    "three_groups_that_share_topics": ([IMU_MAGNETIC_EXACT, IMU_MAGNETIC, IMU_SCAN], 4),
+    "pictures": ([PICTURES], 1),
+    "rgb_depth": ([RGB_DEPTH], 10),
+    # The husky drove for 395 s.
+    "fix_odom_imu": ([FIX_ODOM_IMU], 30),
+}
+_NAMES = chosen(short=[*_PLAYED][:2], long=[*_PLAYED])
+
+
+@pytest.mark.parametrize("backend", chosen(short=[BACKEND], long=BACKENDS))
+@pytest.mark.parametrize(("cases", "speed"), [_PLAYED[name] for name in _NAMES], ids=_NAMES)
 def test_a_recording_that_is_played_gives_the_sets_of_cpp(
     stage: Stage, real_data: Path, cases: list[Case], speed: float
 ):

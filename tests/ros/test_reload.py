@@ -20,7 +20,7 @@ from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.processes import Process, wait_until
 from tests.ros.reloaded import ReloadedFile
 from tests.ros.stage import Stage
-from tests.ros.status import ANY_PORT, first_group, status
+from tests.ros.status import ANY_PORT, status
 from tests.ros.streams import at, merged
 
 pytestmark = pytest.mark.ros
@@ -31,26 +31,6 @@ _FRONT = {"policy": "approximate_time", "queue_size": ROOMY, "slop": "20ms", "to
 
 def _rear(*, topics: tuple[str, ...] = ("/camera", "/lidar"), **keys: Any) -> dict[str, Any]:
     return {"policy": "exact_time", "topics": inputs(dict.fromkeys(topics, VECTOR), qos=LOSSLESS), **keys}
-
-
-def test_a_changed_group_is_built_anew_and_what_a_new_one_lets_wait_leaves_in_time(stage: Stage):
-    recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
-    # Nothing comes on its third topic, nor behind the set that concludes: only the passing of time can let that go.
-    rear = _rear(max_wait="50ms")
-    rear["topics"] += [{"topic": "/radar", "type": VECTOR, "required": False}]
-    file = ReloadedFile(stage, front=_FRONT)
-    relay = file.relay
-    file.reload(front=_rear(output_prefix="/new"), rear=rear)
-    aligned = {"/new/camera": VECTOR, "/new/lidar": VECTOR, "/rear/camera": VECTOR, "/rear/lidar": VECTOR}
-    collector, player = stage.collector(aligned), stage.player(_PAIR)
-    relaying.connect(player, collector, recording, aligned)
-    player.play(recording)
-    relaying.conclude(player, collector, recording, aligned)
-    # The state is that of the relay's last look, and all of this may come before the first.
-    wait_until(lambda: [each["name"] for each in status(relay)["groups"]] == ["front", "rear"], "both groups")
-    assert first_group(relay)["policy"] == "exact_time"
-    assert status(relay)["relay"]["pid"] == relay.pid
-    wait_until(lambda: not collector.endpoints("/front/camera", kind="publisher"), "the end of the old output")
 
 
 def test_a_faulty_file_changes_nothing_and_says_why(stage: Stage):

@@ -1,6 +1,5 @@
 """Where findings are seen: /diagnostics, topics for plotting, `observe`, HTTP."""
 
-import signal
 import struct
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from rosbags.typesys import Stores, get_typestore
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.processes import wait_until
-from tests.ros.sensors import PAIR, assert_looked_at_a_healthy_rig, front, play, stream
+from tests.ros.sensors import PAIR, front, play, stream
 from tests.ros.stage import Collector, Stage
 from tests.ros.streams import merged
 from tests.test_foxglove import detailed, plotted
@@ -106,23 +105,6 @@ def test_what_the_foxglove_layout_draws_is_there_on_a_running_relay(stage: Stage
     (told,) = collector.wait_for("/diagnostics", 1)[-1:]
     array: Any = _STORE.deserialize_cdr(told, DIAGNOSTICS)
     assert {detailed()} == {(each.hardware_id, each.name) for each in array.status}
-
-
-def test_without_diagnostics_and_metrics_nothing_is_published_and_nothing_listens(stage: Stage):
-    collector = stage.collector()
-    relay = stage.relay(front(top={"diagnostics": None, "metrics": None}), "--log-format", "json")
-    relay.wait_for_log('"group": "front", "finding": "no_publisher"}')
-    assert not collector.endpoints("/diagnostics", kind="publisher", node="/syncrelay")
-    relay.send(signal.SIGTERM)
-    assert relay.wait() == 0
-    assert "http://" not in relay.stderr
-
-
-def test_observe_tells_of_a_healthy_group_and_exits_by_that(stage: Stage):
-    player = stage.player(PAIR)
-    player.is_up()
-    player.start(_RIG, speed=1)
-    assert_looked_at_a_healthy_rig(stage.observe(front(), "--seconds", "12", "--json"))
 
 
 def test_observe_exits_with_1_and_what_to_do(stage: Stage):

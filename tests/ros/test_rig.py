@@ -26,8 +26,8 @@ MS = 1_000_000
 SECOND = 1_000_000_000
 _START = 1_700_000_000 * SECOND
 
-
 _TYPES = get_typestore(Stores.ROS2_JAZZY)
+TYPES = {"camera": "sensor_msgs/msg/Image", "lidar": "sensor_msgs/msg/PointCloud2", "imu": "sensor_msgs/msg/Imu"}
 
 
 def shots(name, count, *, seed=1, start=_START):
@@ -75,49 +75,37 @@ def sensor(stage, name, start):
     return stage.start(name, argv)
 
 
-def received(stage, name, type_name, count):
+def received(collector, name, start, count):
     """The first messages of a sensor, once their stamps are found to be those of its schedule."""
-    topic = SENSORS[name].topic
-    reliability = "reliable" if SENSORS[name].reliable else "best_effort"
-    collector = stage.collector({topic: type_name}, reliability=reliability)
-    start = time.time_ns()
-    sensor(stage, name, start)
-    payloads = collector.wait_for(topic, count)
+    payloads = collector.wait_for(SENSORS[name].topic, count)
     stamps = [stamp_of(payload) for payload in payloads]
     assert set(stamps) <= {shot.stamp for shot in shots(name, 20_000, seed=3, start=start)}
     assert stamps == sorted(stamps)
-    return [_TYPES.deserialize_cdr(payload, type_name) for payload in payloads[:count]]
+    return [_TYPES.deserialize_cdr(payload, TYPES[name]) for payload in payloads[:count]]
 
 
 @pytest.mark.ros
 def test_the_sensors_send_a_picture_a_room_and_a_turn_by_their_schedules(stage):
-    first, second = received(stage, "camera", "sensor_msgs/msg/Image", 2)
+    topics = {SENSORS[name].topic: type_name for name, type_name in TYPES.items()}
+    collector, start = stage.collector(topics, reliability="best_effort"), time.time_ns()
+    for name in SENSORS:
+        sensor(stage, name, start)
+    first, second = received(collector, "camera", start, 2)
     assert (first.width, first.height, first.encoding, first.step) == (640, 480, "rgb8", 1920)
     assert len(first.data) == len(second.data) == 1920 * 480
     assert bytes(first.data) != bytes(second.data)
-    (cloud,) = received(stage, "lidar", "sensor_msgs/msg/PointCloud2", 1)
+    (cloud,) = received(collector, "lidar", start, 1)
     expected = [("x", 0, 7), ("y", 4, 7), ("z", 8, 7), ("intensity", 12, 7)]
     assert [(field.name, field.offset, field.datatype) for field in cloud.fields] == expected
     points = list(struct.iter_unpack("<4f", bytes(cloud.data)))
     assert len(points) == cloud.width * cloud.height == 20_000
     assert all(max(abs(x), abs(y)) == pytest.approx(6, abs=1e-3) for x, y, _, _ in points[::100])
     assert max(intensity for *_, intensity in points) == pytest.approx(255, abs=1)
-    before, after = received(stage, "imu", "sensor_msgs/msg/Imu", 2)
+    before, after = received(collector, "imu", start, 2)
     assert math.hypot(before.orientation.z, before.orientation.w) == pytest.approx(1)
     assert before.orientation.z != after.orientation.z
     assert before.linear_acceleration.z == pytest.approx(9.81)
     assert [each.header.frame_id for each in (first, cloud, before)] == ["camera", "lidar", "imu"]
-
-
-@pytest.mark.ros
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_sensor_ends_at_a_signal_and_leaves_nothing_in_shared_memory(stage, number):
-    process = sensor(stage, "imu", time.time_ns())
-    process.wait_until(process.shared_memory, "shared memory of the sensor")
-    stage.note_shared_memory()
-    process.send(number)
-    assert process.wait() == 0
-    assert stage.left_in_shared_memory() == set()
 
 
 _HOLD_RIG = """
@@ -146,23 +134,6 @@ def runs(pid):
         return False
 
 
-@pytest.mark.ros
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, None])
-def test_the_sensors_end_with_the_process_that_started_them_however_that_ends(stage, number):
-    holder = hold(stage)
-    sensors = children_of(holder.pid)
-    held = set().union(*map(segments_of, sensors))
-    if number is None:
-        holder.ask_to_end()
-        assert holder.wait() == 0
-        assert not any(map(runs, sensors))
-    else:
-        holder.send(number)
-        holder.wait()
-        wait_until(lambda: not any(map(runs, sensors)), "the end of the rig's processes")
-    assert left_of(stage.domain, held) == set()
-
-
 # What seldom happens by itself: two that leave a port at once, and each thinks that the other removes it.
 _PORTS_ARE_LEFT = """
 import contextlib, os
@@ -189,18 +160,16 @@ leaving._take_from_rcl = take_and_leave_the_ports
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("number", [None, signal.SIGKILL])
-def test_the_last_sensor_to_end_removes_the_ports_that_dds_left(stage, number):
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_the_sensors_end_with_the_process_that_started_them_and_the_last_removes_what_dds_left(stage, number):
     stage.before_each_sensor(_PORTS_ARE_LEFT)
     holder = hold(stage)
     sensors = children_of(holder.pid)
-    if number is None:
-        holder.ask_to_end()
-    else:
-        holder.send(number)
+    held = set().union(*map(segments_of, sensors))
+    holder.send(number)
     holder.wait()
     wait_until(lambda: not any(map(runs, sensors)), "the end of the rig's processes")
-    assert left_of(stage.domain, ()) == set()
+    assert left_of(stage.domain, held) == set()
 
 
 _AT_THE_END = """

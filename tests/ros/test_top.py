@@ -27,24 +27,17 @@ GROUPS = {
 }
 
 
-@pytest.fixture
-def relay(stage: Stage):
-    """A relay of two groups, one of which is given all that it needs."""
-    started = stage.relay(config(GROUPS, metrics=ANY_PORT))
-    player = stage.player(PAIR)
-    player.match()
-    player.start(merged(stream("/camera", hz=10), stream("/lidar", hz=10, shift_ms=7)), speed=1)
-    wait_for_finding(started, "healthy")
-    wait_for_finding(started, "no_publisher", "rear")
-    return started
-
-
 def once(stage: Stage, *words: str) -> tuple[int, str, str]:
     top = stage.start("top", [sys.executable, "-m", "syncrelay", "top", "--once", *words])
     return top.wait(), " ".join(top.stdout.split()), top.stderr
 
 
-def test_its_groups_are_printed_once(stage: Stage, relay):
+def test_its_groups_are_printed_once_and_the_screen_shows_them_until_it_ends(stage: Stage):
+    relay = stage.relay(config(GROUPS, metrics=ANY_PORT))
+    player = stage.player(PAIR)
+    player.match()
+    player.start(merged(stream("/camera", hz=10), stream("/lidar", hz=10, shift_ms=7)), speed=1)
+    wait_for_finding(relay, "no_publisher", "rear")
     code, shown, talk = -1, "", ""
     relay.wait_for_log(f"watch with `syncrelay top --url {address(relay)}`")
 
@@ -59,8 +52,6 @@ def test_its_groups_are_printed_once(stage: Stage, relay):
     assert f"/syncrelay at {address(relay)}: running, not ready" in shown
     assert "nobody publishes /rear (geometry_msgs/msg/Vector3Stamped)" in shown
 
-
-def test_the_screen_shows_it_until_it_ends_and_says_so_then(relay):
     async def look() -> None:
         app = TopApp([ask(address(relay), timeout_s=DEADLINE_S, whole_s=DEADLINE_S)])
         async with app.run_test(size=(80, 24)) as pilot:
