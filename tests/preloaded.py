@@ -53,7 +53,6 @@ _MAINS: Final = {
             "tests.faults.witness",
             "tests.ros.collector",
             "tests.ros.player",
-            "tests.scenarios.source",
         )
     },
 }

@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 
 from syncrelay.explain import Endpoint, Mismatch, Standstill
 from tests.explain.scenario import BEGAN, S, Source, Told, run
-from tests.scenarios.play import ACT_S
-from tests.scenarios.rigs import Scenario, cure_in, group_of, placed, write
+from tests.scenarios.rigs import ACT_S, Scenario, cure_in, group_of, placed, write
 from tests.scenarios.streams import Sampler, Stream
 
 LONGEST_ACT_S = 75.0

@@ -22,7 +22,14 @@ SEEDS: dict[str, tuple[int, ...]] = {
     "clock_steps_on": (1, 2),
     "camera_returns_best_effort": (0, 1),
     "camera_returns_as_points": (0,),
+    # At these the relay stands still for 3 s.
+    "by_stamps": (55,),
+    "by_receipt": (62,),
+    "beside_an_imu": (12,),
+    "with_optional": (0,),
+    "latest": (15,),
 }
+_SAID_TO_BE_SLOW = {"by_stamps", "by_receipt", "beside_an_imu"}
 _OTHER_SEEDS = (100,)
 _CASES = [(name, seed) for name in RIGS for seed in SEEDS.get(name, _OTHER_SEEDS)]
 # What goes on while a drift is not proven yet; the log does not say it.
@@ -44,6 +51,8 @@ def test_at_any_moment_the_cause_is_named_and_no_other(name: str, seed: int):
         assert first.topics == {f"/{name}/{topic}" for topic in rig.about}, first
     if rig.first and rig.heals:
         _is_well_at_last(play)
+    if name in _SAID_TO_BE_SLOW:
+        assert "too_slow" in {line.code for line in play.told.warnings}
 
 
 def _is_true(play: Play, code: str | None, second: float, allowed: set[str]) -> bool:

@@ -1,10 +1,8 @@
-"""What the sensors of a scenario send: one row for each stream, as a value that travels to the source as JSON."""
+"""What the sensors of a scenario send: one row for each stream."""
 
-import json
 import math
 import random
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TypedDict
 
 from tests.ros.cdr_messages import VECTOR
@@ -84,11 +82,3 @@ class Sampler:
         self._number += 1
         self._sent = max(sent, self._sent)
         return self._sent, sampled, self._stamp
-
-
-def as_json(streams: Sequence[Stream]) -> str:
-    return json.dumps([asdict(stream) for stream in streams])
-
-
-def from_json(text: str) -> list[Stream]:
-    return [Stream(**row) for row in json.loads(text)]
