@@ -3,12 +3,15 @@
     python -m tests.mutants --rooms sync explain --sample 200 --seed 1
 
 Of each room so many mutants are drawn, or all are taken. For each the tests that run its lines are run, the quickest
-first, in a copy of the tree, until one fails; one that hangs is noticed too. What lives is printed.
+first, in a copy of the tree, until one fails; then the files that hold them, as what a fixture makes once is looked at
+by others. Where only an import runs its lines, all tests of the room are run. A mutant that hangs and one that cannot
+be imported is noticed too. What lives is printed.
 """
 
 import argparse
 import os
 import random
+import resource
 import shutil
 import subprocess
 import sys
@@ -26,34 +29,46 @@ from coverage import CoverageData
 from tests.mutants.mutations import Mutant, mutants_of, mutated
 
 ROOT: Final = Path(__file__).parents[2]
-_WORLDS: Final = "tests/simulated/test_worlds.py"
+_RELAYED: Final = ("tests/simulated", "tests/scenarios", "tests/config", "tests/status")
 ROOMS: Final = {
     "sync": ["tests/sync"],
-    "explain": ["tests/explain"],
-    "dataflow": ["tests/dataflow", "tests/sync", _WORLDS],
-    "relay": ["tests/dataflow", _WORLDS],
+    "explain": ["tests/explain", "tests/scenarios"],
+    "dataflow": ["tests/dataflow", "tests/sync", *_RELAYED],
+    "relay": ["tests/dataflow", *_RELAYED],
     "recordings/bag": ["tests/recordings/bag"],
 }
 _LEFT_OUT: Final = "not (ros or browser or peer or process or faults or real_data)"
 _PYTEST: Final = (sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "--no-header", "--tb=no")
-# A test of a mutant may take so many times as long as usual, and so much more to begin.
+# How pytest ends where a test fails; and where a test is not found, or a conftest.py cannot be imported.
+_FAILED: Final = 1
+_REFUSED: Final = 4
+_NOT_IMPORTED: Final = "during collection"
+# Tests of a mutant may take so many times as long as usual, and so much more to begin.
 _PATIENCE: Final = 5
 _START_S: Final = 60.0
+# A mutant that takes memory without end fails before the machine does.
+_MEMORY: Final = 8 << 30
 # So many tests are tried first: most mutants end there.
 _FIRST: Final = 30
 
 
 class Runs(NamedTuple):
-    """Which tests run each line of each file of a room, and how long each takes."""
+    """Which tests run each line of each file of a room, and how long each test takes."""
 
     tests: dict[str, dict[int, list[str]]]
     seconds: dict[str, float]
 
     def of(self, path: str, mutant: Mutant) -> list[str]:
-        """Return the tests that run a mutant's lines, the quickest first."""
+        """Return the tests that run a mutant's lines, or else all, those of its file first; the quickest first."""
         lines = self.tests.get(path, {})
         found = {test for line in range(mutant.line, mutant.last_line + 1) for test in lines.get(line, ())}
-        return sorted(found, key=lambda test: self.seconds.get(test, 0.0))
+        if found:
+            return self._quickest(found)
+        near = {test for tests in lines.values() for test in tests}
+        return self._quickest(near) + self._quickest(self.seconds.keys() - near)
+
+    def _quickest(self, tests: set[str]) -> list[str]:
+        return sorted(tests, key=lambda test: (self.seconds.get(test, 0.0), test))
 
 
 def main() -> int:
@@ -63,30 +78,34 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     asked = parser.parse_args()
+    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
     for room in asked.rooms:
         _say(f"== {room}")
-        tried = _sample(room, asked.sample, asked.seed)
-        noticed = sum(_tried(room, tried, asked.jobs))
-        _say(f"{room}: {noticed} of {len(tried)} mutants noticed, {noticed / max(1, len(tried)):.1%}")
+        mutants = drawn(room, asked.sample, asked.seed)
+        noticed = sum(tried(room, mutants, asked.jobs))
+        _say(f"{room}: {noticed} of {len(mutants)} mutants noticed, {noticed / max(1, len(mutants)):.1%}")
     return 0
 
 
-def _sample(room: str, count: int | None, seed: int) -> list[tuple[str, Mutant]]:
-    paths = sorted((ROOT / "syncrelay" / room).glob("*.py"))
+def drawn(room: str, count: int | None, seed: int) -> list[tuple[str, Mutant]]:
+    """Return so many mutants of a room, or all, each with the file that it changes."""
+    paths = sorted((ROOT / "syncrelay" / room).rglob("*.py"))
     found = [(str(path.relative_to(ROOT)), each) for path in paths for each in mutants_of(path.read_text())]
     if count is not None and count < len(found):
         found = random.Random(f"{seed} {room}").sample(found, count)
     return found
 
 
-def _tried(room: str, mutants: Sequence[tuple[str, Mutant]], jobs: int) -> Iterator[bool]:
+def tried(room: str, mutants: Sequence[tuple[str, Mutant]], jobs: int) -> Iterator[bool]:
+    """Yield of each mutant of a room whether the tests notice it, and print those that live."""
     with tempfile.TemporaryDirectory(prefix="syncrelay-mutants-") as folder:
+        first = Path(folder, "0")
+        shutil.copytree(ROOT, first, ignore=shutil.ignore_patterns(".*", "build", "dist", "__pycache__"))
+        runs = _runs(room, first)
         trees: SimpleQueue[Path] = SimpleQueue()
-        for number in range(jobs):
-            tree = Path(folder, str(number))
-            shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".*", "build", "dist", "__pycache__"))
-            trees.put(tree)
-        runs = _runs(room, Path(folder, "0"))
+        trees.put(first)
+        for number in range(1, jobs):
+            trees.put(shutil.copytree(first, Path(folder, str(number))))
 
         def is_noticed(tried: tuple[str, Mutant]) -> bool:
             tree = trees.get()
@@ -104,8 +123,10 @@ def _tried(room: str, mutants: Sequence[tuple[str, Mutant]], jobs: int) -> Itera
 
 def _runs(room: str, tree: Path) -> Runs:
     """Run a room's tests once, and note which lines each runs."""
-    words = ["--cov", f"syncrelay/{room}", "--cov-context", "test", "--cov-report=", "--junitxml", "times.xml"]
-    done = _pytest(tree, [*words, "-m", _LEFT_OUT, *ROOMS[room]], None)
+    settings = tree / "coverage.ini"
+    settings.write_text("[run]\nconcurrency = thread, greenlet\n")
+    words = ["--cov", f"syncrelay/{room}", "--cov-context", "test", "--cov-report=", "--cov-config", str(settings)]
+    done = _pytest(tree, [*words, "--junitxml", "times.xml", "-m", _LEFT_OUT, *ROOMS[room]])
     if done.returncode != 0:
         raise SystemExit(f"the tests fail without a mutant:\n{done.stdout[-2000:]}")
     data = CoverageData(str(tree / ".coverage"))
@@ -128,21 +149,36 @@ def _is_noticed(tree: Path, path: str, mutant: Mutant, runs: Runs) -> bool:
     source = (ROOT / path).read_text()
     (tree / path).write_text(mutated(source, mutant))
     try:
-        for part in (tests[:_FIRST], tests[_FIRST:]):
-            usual = sum(runs.seconds.get(test, 0.0) for test in part)
-            try:
-                # pytest ends with 1 where a test fails, and with 2 or 4 where a module cannot be imported.
-                if part and _pytest(tree, part, _START_S + _PATIENCE * usual).returncode != 0:
-                    return True
-            except subprocess.TimeoutExpired:
-                return True
-        return False
+        return any(_fail(tree, part, runs) for part in (tests[:_FIRST], tests[_FIRST:], _files(tests)) if part)
     finally:
         (tree / path).write_text(source)
 
 
-def _pytest(tree: Path, words: Sequence[str], timeout_s: float | None) -> subprocess.CompletedProcess[str]:
-    environ = {**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
+def _fail(tree: Path, tests: Sequence[str], runs: Runs) -> bool:
+    """Whether one of some tests, or of the tests in some files, fails, hangs or cannot be imported."""
+    asked = set(tests)
+    usual = [seconds for test, seconds in runs.seconds.items() if asked & {test, *_files([test])}]
+    longest = f"--timeout={_START_S + _PATIENCE * max(usual):.0f}"
+    try:
+        done = _pytest(tree, [longest, "-m", _LEFT_OUT, *tests], _START_S + _PATIENCE * sum(usual))
+    except subprocess.TimeoutExpired:
+        return True
+    if done.returncode == _REFUSED and tests != _files(tests):
+        # Their files cannot be imported, or the mutant is in the names of tests.
+        return _fail(tree, _files(tests), runs)
+    if done.returncode not in (0, _FAILED, _REFUSED) and _NOT_IMPORTED not in done.stdout:
+        _say(f"pytest ended with {done.returncode}, which counts as nothing: {(done.stdout + done.stderr)[-2000:]}")
+    return done.returncode in (_FAILED, _REFUSED) or _NOT_IMPORTED in done.stdout
+
+
+def _files(tests: Sequence[str]) -> list[str]:
+    return sorted({test.partition("::")[0] for test in tests})
+
+
+def _pytest(tree: Path, words: Sequence[str], timeout_s: float | None = None) -> subprocess.CompletedProcess[str]:
+    # The first run leaves compiled modules to the others; a mutant could be as old and as long as the module itself.
+    compiles = {} if timeout_s is None else {"PYTHONDONTWRITEBYTECODE": "1"}
+    environ = {**os.environ, "PYTHONPATH": str(tree), **compiles}
     return subprocess.run(
         [*_PYTEST, *words], cwd=tree, env=environ, capture_output=True, text=True, timeout=timeout_s, check=False
     )

@@ -29,7 +29,7 @@ _RECKONED: Final = {
 }
 # What is said to people, and what is read by tools alone.
 _SAID: Final = frozenset({"log", "info", "warning", "error", "debug", "exception"})
-_FOR_TOOLS: Final = frozenset({"__slots__", "__all__"})
+_FOR_TOOLS: Final = frozenset({"__slots__", "__all__", "__repr__"})
 
 
 class Mutant(NamedTuple):
@@ -126,7 +126,10 @@ def _code(node: ast.AST) -> Iterator[ast.AST]:
             name in _SAID
         ):
             return
-        case ast.Assign(targets=[ast.Name(id=name)]) if name in _FOR_TOOLS:
+        case ast.Assign(targets=[ast.Name(id=name)]) | ast.FunctionDef(name=name) if name in _FOR_TOOLS:
+            return
+        case ast.keyword(arg="strict"):
+            # Of zip: an assertion, which nothing that holds can break.
             return
     yield node
     skipped = {id(getattr(node, name, None)) for name in ("annotation", "returns")}
