@@ -18,10 +18,10 @@ from tests.faults.mutations import made_up, mutated
 pytestmark = pytest.mark.faults
 
 _EXAMPLES = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
-_FILES = chosen(short=1500, long=10_000)
+_FILES = chosen(short=400, long=10_000)
 _PARTS = 4
-_MADE_UP = chosen(short=150, long=5000)
-_PAIRS = chosen(short=80, long=2000)
+_MADE_UP = chosen(short=40, long=5000)
+_PAIRS = chosen(short=20, long=2000)
 
 
 def _mutated(number: int) -> list[bytes]:

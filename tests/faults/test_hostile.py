@@ -18,7 +18,7 @@ from tests.ros.streams import BEGIN, at, merged
 pytestmark = [pytest.mark.ros, pytest.mark.faults]
 
 _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
-_MESSAGES = chosen(short=1000, long=10_000)
+_MESSAGES = chosen(short=500, long=10_000)
 
 
 def _group(policy: str, *, of_topic: dict | None = None, **keys) -> dict:

@@ -13,13 +13,13 @@ from tests.ros.stage import Stage
 
 pytestmark = [pytest.mark.ros, pytest.mark.faults, pytest.mark.soak]
 
-_SOAK_S = chosen(short=10, long=900)
+_SOAK_S = chosen(short=4, long=900)
 # Of each of four topics: together two million messages in a quarter of an hour.
 _HZ = chosen(short=100, long=560)
 _TOPICS = ("/camera", "/lidar", "/radar", "/imu")
 # Holds what a busy machine may be late with: messages of one topic for seconds, while those of another come.
 _QUEUE = 2000
-_WARM_S = chosen(short=4, long=60)
+_WARM_S = chosen(short=2, long=60)
 # What is seen once a second grows for the first minute or so: windows, histories, the allocator's own.
 _GROWTH_MB = 10
 
