@@ -37,8 +37,7 @@ def chosen(page) -> str:
     return page.locator("#groups [aria-current=true] strong").text_content()
 
 
-@pytest.mark.parametrize("width", [390, 1600])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(("scheme", "width"), [("light", 390), ("dark", 1600)])
 def test_everything_is_shown_without_a_complaint_or_a_request_elsewhere(scheme, width, browser):
     with watching(browser, states.rig(), scheme=scheme, width=width) as (opened_page, relay):
         page = opened_page.page
@@ -197,12 +196,6 @@ def test_names_from_strangers_run_nothing_and_hide_nothing(browser):
         assert opened_page.complaints == []
 
 
-def test_a_finding_about_two_inputs_marks_both(browser):
-    with watching(browser, states.nothing()) as (opened_page, _):
-        notes = opened_page.page.locator("#group h4 .level")
-        assert [each.strip() for each in notes.all_text_contents()] == ["no publisher", "no publisher"]
-
-
 def test_a_row_of_the_list_has_the_colour_of_its_level_and_keeps_figures_and_units_together(browser):
     with watching(browser, states.rig()) as (opened_page, _):
         for colour, has in (("borderLeftColor", ".group"), ("color", ".level")):
@@ -222,12 +215,14 @@ def test_a_policy_without_a_tolerance_shows_none(browser):
         assert "exact_time, queue_size 10" in opened_page.page.locator("#group .head").text_content()
 
 
-def test_an_input_without_publishers_and_subscribers_says_so(browser):
+def test_inputs_without_publishers_and_subscribers_say_so_and_a_finding_about_both_marks_both(browser):
     told = states.nothing()
     (report,) = told.groups
     inputs = tuple(replace(each, graph=replace(each.graph, subscribers=())) for each in report.facts.inputs)
     state = replace(told, groups=(replace(report, facts=replace(report.facts, inputs=inputs)),))
     with watching(browser, state) as (opened_page, _):
+        notes = opened_page.page.locator("#group h4 .level").all_text_contents()
+        assert [each.strip() for each in notes] == ["no publisher", "no publisher"]
         shown = opened_page.page.locator("#group .input").first.inner_text()
         assert "no publishers" in shown
         assert "/front/camera/image_raw: no subscribers" in shown
