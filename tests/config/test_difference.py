@@ -77,14 +77,6 @@ def test_a_key_is_told_with_its_values_as_they_are_written(old, new, expected, e
     assert keys(before, after, environ) == expected
 
 
-def test_the_keys_of_another_policy_go_and_come_with_it(environ):
-    other = FRONT.replace("policy: exact_time", "policy: approximate_time\n    slop: 20ms")
-    assert keys(file(FRONT), file(other), environ) == [
-        ("policy", "exact_time", "approximate_time"),
-        ("slop", None, "20ms"),
-    ]
-
-
 def test_a_key_of_defaults_is_told_in_the_groups_that_have_it(environ):
     rear = group("rear", "/a", "/b", keys="queue_size: 3")
     found = between(file(FRONT, rear), file(FRONT, rear, top="defaults: {queue_size: 7}\n"), environ)
@@ -95,12 +87,6 @@ def test_inputs_that_come_go_and_change_places_are_told_by_name(environ):
     old, new = file(group("front", "/a", "/b", "/c")), file(group("front", "/c", "/d", "/a"))
     (change,) = between(old, new, environ).groups
     assert (change.keys, change.removed, change.added, change.reordered) == ((), ("/b",), ("/d",), True)
-
-
-def test_a_key_of_an_input_is_told_wherever_it_stands_now(environ):
-    old = file(group("front", "/a", "/b"))
-    new = file(group("front", "/b", "/a")).replace("/a,", "/a, offset: -5ms, stamp: {field: header.stamp},")
-    assert keys(old, new, environ) == [("/a offset", None, "-5ms"), ("/a stamp", None, "{field: header.stamp}")]
 
 
 def test_a_type_that_another_group_writes_is_told(environ):

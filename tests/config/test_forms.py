@@ -83,12 +83,12 @@ def test_a_list_of_everything_twice_over_is_refused_before_it_is_built(error_of)
     )
 
 
-def test_a_file_with_ten_thousand_faults_shows_a_hundred(environ):
-    text = GOOD + "".join(f"key{n}: 1\n" for n in range(10_000))
+def test_a_file_with_a_thousand_faults_shows_a_hundred(environ):
+    text = GOOD + "".join(f"key{n}: 1\n" for n in range(1000))
     with pytest.raises(ConfigError) as raised:
         load_text(text, environ=environ)
-    assert len(raised.value.problems) == 10_000
-    assert str(raised.value).endswith("\n... and 9900 more")
+    assert len(raised.value.problems) == 1000
+    assert str(raised.value).endswith("\n... and 900 more")
 
 
 @pytest.mark.parametrize(

@@ -98,20 +98,6 @@ def test_defaults_without_a_group_are_refused(environ):
     ]
 
 
-def test_an_output_that_another_file_takes_in_is_a_loop(environ):
-    (error,) = errors(environ, one=FRONT, two=file(group("rear", "/front/a", "/c")))
-    assert error == (
-        "one.yaml:6:17: groups.front.topics[0].topic: the default output `/front/a` is also an input (line 6 of"
-        " two.yaml), which makes a loop: choose another `output`"
-    )
-
-
-def test_figures_that_one_file_asks_for_are_no_outputs_of_another(environ):
-    scalars = "version: 1\ndiagnostics: {scalars: true}\n"
-    (error,) = errors(environ, one=FRONT.replace("Image}", "Image, output: ~/front/span_ms}", 1), two=scalars)
-    assert error.startswith("one.yaml:6:58: groups.front.topics[0].output: the output `/syncrelay/front/span_ms` is")
-
-
 def test_everything_wrong_with_all_files_is_told_at_once(environ):
     assert errors(environ, one=FRONT.replace("policy", "polcy"), two="a: 1\n b: 2\n", three="") == [
         "one.yaml:4:5: groups.front.polcy: unknown key, did you mean `policy`?",
@@ -123,11 +109,3 @@ def test_everything_wrong_with_all_files_is_told_at_once(environ):
         "two.yaml:3:3: groups.front: the group `front` is also on line 3 of one.yaml: rename one of them",
         "two.yaml:4:13: groups.front.policy: unknown value `exakt_time`, did you mean `exact_time`?",
     ]
-
-
-def test_what_follows_from_a_fault_is_not_told_of_files_together_either(environ):
-    faulty = FRONT.replace("    topics", "    max_wait: 1 parsec\n    topics").replace(
-        "Image}", "Image, required: false}", 1
-    )
-    (error,) = errors(environ, one=faulty, two=file(group("rear", "/c", "/d")))
-    assert error.startswith("one.yaml:5:15: groups.front.max_wait: unknown unit `parsec`")

@@ -8,7 +8,9 @@ from typing import Any
 import pytest
 
 from syncrelay.config import ConfigError, Problem, load_text
+from tests.faults.extent import chosen
 
+_SIZES = chosen(short=(150, 300), long=(300, 600))
 _TOPICS = "{policy: exact_time, topics: ["
 _TOPIC = "{topic: /a, type: sensor_msgs/msg/Image"
 
@@ -83,27 +85,24 @@ def _work(text: str, environ: dict[str, str]) -> int:
 @pytest.mark.parametrize("shape", _SHAPES.values(), ids=_SHAPES)
 @pytest.mark.long
 def test_twice_as_much_of_anything_takes_about_twice_the_work(shape: Callable[[int], str], environ):
-    once, twice = (_work(shape(n), environ) for n in (300, 600))
+    once, twice = (_work(shape(n), environ) for n in _SIZES)
     # What is quadratic comes to nearly 4.
     assert twice < 2.5 * once
 
 
-@pytest.mark.parametrize(
-    "shape", ["keys of the file misspelt", "policies misspelt", "keys of another level", "packages misspelt"]
-)
 @pytest.mark.long
-def test_a_valid_word_is_looked_for_only_as_often_as_somebody_may_read_of_it(shape: str, environ):
+def test_a_valid_word_is_looked_for_only_as_often_as_somebody_may_read_of_it(environ):
     looked = 0
 
     def count(frame: Any, event: str, _argument: Any) -> None:
         nonlocal looked
         looked += event == "call" and frame.f_code is get_close_matches.__code__
 
-    problems = _read(_SHAPES[shape](1500), environ, count)
+    problems = _read(_SHAPES["packages misspelt"](1100), environ, count)
     assert looked == 1000 < len(problems)
 
 
 def test_of_the_first_thousand_misspelt_keys_each_is_told_what_was_meant(environ):
-    problems = _read(_SHAPES["keys of the file misspelt"](1500), environ, lambda *_: None)
+    problems = _read(_SHAPES["keys of the file misspelt"](1100), environ, lambda *_: None)
     texts = [problem.text for problem in problems if problem.code == "unknown_key"]
-    assert [text.endswith("did you mean `groups`?") for text in texts] == [True] * 1000 + [False] * 500
+    assert [text.endswith("did you mean `groups`?") for text in texts] == [True] * 1000 + [False] * 100

@@ -58,23 +58,6 @@ def test_what_waits_and_what_comes_is_dropped_as_paused_and_what_comes_after_is_
     assert lidar.dropped[DropReason.PAUSED] == 2
 
 
-def test_a_latest_message_outlives_a_pause_be_it_from_before_or_from_within():
-    group, outlets = _group(policy="latest_time", trigger="/camera")
-    _give(group, 1, 0)
-    group.pause()
-    _give(group, 0, 10)
-    group.unpause()
-    _give(group, 0, 20)
-    assert _sent(outlets) == [[20], [0]]
-    group.pause()
-    for ms in (30, 40):
-        _give(group, 1, ms)
-    group.unpause()
-    _give(group, 0, 50)
-    assert _sent(outlets) == [[20, 50], [0, 40]]
-    assert [dict(each.dropped) for each in group.counts()] == [{DropReason.PAUSED: 1}] * 2
-
-
 _STEPS = st.lists(
     st.one_of(
         st.tuples(st.integers(0, 2), st.integers(-25, 10)),
