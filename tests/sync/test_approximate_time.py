@@ -1,68 +1,9 @@
-from functools import partial
-
 from syncrelay.sync import ApproximateTime, Message, SyncGroup
-from tests.sync.support.timeline import TICK_NS, drawn_cases, play_group
+from tests.sync.support.timeline import TICK_NS, play_group
 
 
-def approximate(inputs=2, queue=10, slop=20, periods=None, **options):
-    min_periods_ns = periods and [period * TICK_NS for period in periods]
-    return ApproximateTime(
-        n_inputs=inputs, queue_size=queue, slop_ns=slop * TICK_NS, min_periods_ns=min_periods_ns, **options
-    )
-
-
-three = partial(approximate, 3)
-
-test_drawn = drawn_cases(
-    {
-        "a set leaves when the next message proves it the best": (
-            approximate,
-            """
-            lidar  |a...b...c
-            camera |.A...B...
-            -> b: aA
-            -> c: bB
-            """,
-        ),
-        "what was skipped comes back for the next set": (
-            three,
-            """
-            lidar  |a..b..........c
-            camera |.A......B......
-            radar  |..r.....s......
-            -> B: aAr
-            -> c: bBs
-            """,
-        ),
-        "without a penalty of age the least span wins": (
-            partial(approximate, age_penalty=0.0),
-            """
-            lidar  |a..b..c
-            camera |..X...Y
-            -> b: a superseded, bX
-            -> Y: cY
-            """,
-        ),
-        "with a penalty of age the older set may win": (
-            partial(approximate, age_penalty=1.0),
-            """
-            lidar  |a..b..c
-            camera |..X...Y
-            -> b: aX
-            -> Y: b superseded, cY
-            """,
-        ),
-        "a known least period lets a set leave when its last member arrives": (
-            partial(approximate, periods=(3, 0)),
-            """
-            lidar  |a...b
-            camera |.A..B
-            -> A: aA
-            -> B: bB
-            """,
-        ),
-    }
-)
+def approximate(inputs, queue=10, slop=20):
+    return ApproximateTime(n_inputs=inputs, queue_size=queue, slop_ns=slop * TICK_NS)
 
 
 def test_an_overflow_is_excused_in_a_long_search_too_once_another_input_has_the_latest_head():

@@ -8,6 +8,7 @@ import weakref
 import pytest
 
 from syncrelay.sync import ApproximateTime, ApproximateTimeEager, Message, SyncGroup
+from tests.faults.extent import chosen
 from tests.sync.support.streams import MS, gappy, in_order
 
 WIDE_NS = 10**15
@@ -33,7 +34,7 @@ def calls_of_each(policy, events):
 @pytest.mark.parametrize("policy", POLICIES)
 def test_no_event_costs_a_product_of_queues(policy):
     # 5 inputs with queues of 50: the products of a plain search go into the millions.
-    for seed in range(4):
+    for seed in range(chosen(short=1, long=4)):
         events = gappy(random.Random(seed), 5, 1_000)
         for slop in (1_000 * MS, WIDE_NS):
             assert max(calls_of_each(policy(n_inputs=5, queue_size=50, slop_ns=slop), events)) < 600
@@ -41,7 +42,7 @@ def test_no_event_costs_a_product_of_queues(policy):
 
 @pytest.mark.parametrize("policy", POLICIES)
 def test_a_longer_queue_costs_no_more(policy):
-    for seed in range(3):
+    for seed in range(chosen(short=1, long=3)):
         rng = random.Random(seed)
         n_inputs = rng.randint(2, 9)
         events = in_order(rng, n_inputs, 2_000)
@@ -62,7 +63,7 @@ def test_no_more_messages_are_kept_than_the_queues_hold(policy):
     most = 0
     gc.disable()
     try:
-        for index, stamp in in_order(random.Random(1), n_inputs, 10_000):
+        for index, stamp in in_order(random.Random(1), n_inputs, 3_000):
             payload = Payload()
             alive.add(payload)
             group.add(Message(index, stamp, payload), now=0)

@@ -1,10 +1,11 @@
 """A flush, of every policy: all that is buffered leaves, and nothing of it is known afterwards."""
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from syncrelay.sync import Drop, DropReason, Message
+from tests.faults.extent import chosen
 from tests.sync.support.rigs import POLICIES, TICK, Options, make_policy, options, steps
 
 every_policy = pytest.mark.parametrize("name", POLICIES)
@@ -42,6 +43,7 @@ def test_what_overflowed_before_it_is_not_missed_after_it(name):
 
 
 @every_policy
+@settings(max_examples=chosen(short=8, long=400))
 @given(data=st.data(), chosen=options(optional=False, limited=False, thinned=False))
 def test_the_policy_is_as_new_but_for_the_queues_that_were_needed(name, data, chosen):
     before, after = (

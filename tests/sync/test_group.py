@@ -86,34 +86,6 @@ test_drawn = drawn_cases(
             -> B: bB
             """,
         ),
-        "the set after one that leaves waits anew": (
-            partial(approximate, max_wait=4),
-            """
-            lidar  |a..b..........
-            camera |.A...B........
-            -> b: aA
-            -> @9: bB
-            """,
-        ),
-        "also if one message ends the one wait and begins the other": (
-            partial(approximate, max_wait=8),
-            """
-            lidar  |a....b.........
-            camera |.A....B........
-            arrive: a A B b
-            -> b: aA
-            -> @14: bB
-            """,
-        ),
-        "a trigger of latest_time expires": (
-            partial(latest, max_age=3, max_wait=4),
-            """
-            lidar |.....a..b.....
-            odom  |A..........B..
-            -> @9: a expired, A expired
-            -> B: b too_far
-            """,
-        ),
         "a set takes the optional message nearest to its middle, as soon as none can be nearer": (
             partial(approximate, 3, optional=(2,), max_wait=5),
             """
@@ -121,49 +93,6 @@ test_drawn = drawn_cases(
             camera |....B....
             imu    |..v..w...
             -> w: v superseded, bBw
-            """,
-        ),
-        "after max_wait it leaves with what there is": (
-            partial(approximate, 3, optional=(2,), max_wait=5),
-            """
-            lidar  |....b.....c......
-            camera |....B.....C......
-            imu    |...y.............
-            -> @9: bBy
-            -> @15: cC-
-            """,
-        ),
-        "of two sets that wait, a message goes to the nearer": (
-            partial(approximate, 3, slop=5, optional=(2,), max_wait=20),
-            """
-            lidar  |a...b...
-            camera |A...B...
-            gps    |...x....
-            gps    |......y.
-            arrive: a A b B x y
-            -> x: aA-
-            -> y: bBx
-            """,
-        ),
-        "by key: not waited for once its input has shown the key of a later set": (
-            partial(by_key, 3, optional=(2,), max_wait=9),
-            """
-            left  |ab....
-            right |AB....
-            depth |..wz..
-            keys: aA bBz
-            -> z: aA-, w superseded, bBz
-            """,
-        ),
-        "every third set passes, the first first, and of the others no message": (
-            partial(exact, every=3),
-            """
-            left  |abcd
-            right |ABCD
-            -> A: aA
-            -> B: b thinned, B thinned
-            -> C: c thinned, C thinned
-            -> D: dD
             """,
         ),
         "periods are counted from the first set, so what passes is spread evenly": (

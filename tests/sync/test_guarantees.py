@@ -4,10 +4,11 @@ from collections import Counter
 from dataclasses import replace
 
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from syncrelay.sync import Drop, DropReason, Match, Message
+from tests.faults.extent import chosen
 from tests.sync.support.rigs import (
     BY_CLOCK,
     ONCE,
@@ -25,8 +26,15 @@ from tests.sync.support.rigs import (
     take,
 )
 
-every_policy = pytest.mark.parametrize("policy", POLICIES)
-also_by_clock = pytest.mark.parametrize("policy", [*POLICIES, *BY_CLOCK])
+few_examples = settings(max_examples=chosen(short=8, long=400))
+
+
+def every_policy(test):
+    return pytest.mark.parametrize("policy", POLICIES)(few_examples(test))
+
+
+def also_by_clock(test):
+    return pytest.mark.parametrize("policy", [*POLICIES, *BY_CLOCK])(few_examples(test))
 
 
 @st.composite
@@ -272,22 +280,7 @@ def test_the_second_pass_of_a_looped_recording_gives_the_sets_of_the_first(polic
     assert sets_of(flat(two)) == sets_of(flat(one))
 
 
-@pytest.mark.parametrize("policy", ONCE)
-@given(rig=rigs(optional=False, limited=False, thinned=False))
-def test_a_policy_alone_loses_nothing_either(policy, rig):
-    chosen, taken = rig
-    subject = make_policy(policy, chosen)
-    fed = [step.message for step in taken if step.message is not None]
-    left = flat([subject.add(message) for message in fed])
-    left += subject.flush(DropReason.SHUTDOWN)
-    matched = [message for match in sets_of(left) for message in members(match)]
-    dropped = [outcome.message for outcome in left if isinstance(outcome, Drop)]
-    assert Counter(matched + dropped) == Counter(fed)
-    assert [subject.buffered(place) for place in range(chosen.n_inputs)] == [0] * chosen.n_inputs
-    assert subject.waits_started == subject.waits_ended
-
-
-@every_policy
+@pytest.mark.parametrize("policy", POLICIES)
 def test_the_queue_that_was_needed_is_told_and_would_have_matched(policy):
     """Input 0 is twelve ticks behind input 1, whose queue has lost what its message needs."""
 

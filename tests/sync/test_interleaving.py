@@ -8,9 +8,11 @@ import random
 import pytest
 
 from syncrelay.sync import ApproximateTime, ExactTime, Match, Message, SyncGroup
+from tests.faults.extent import chosen
 from tests.sync.support.streams import MS, rising_stamps
 
 _ENOUGH = 1000
+_STREAMS = chosen(short=25, long=400)
 
 
 def _in_turns(rng, streams):
@@ -35,7 +37,7 @@ def _sets(policy, events):
 @pytest.mark.parametrize("name", ["approximate_time", "exact_time"])
 def test_sets_do_not_depend_on_how_the_inputs_interleave(name):
     found = 0
-    for seed in range(100):
+    for seed in range(_STREAMS):
         rng = random.Random(seed)
         n_inputs, slop = rng.choice((2, 3, 4)), rng.choice((0, MS, 10 * MS, 1000 * MS))
         shared = rising_stamps(rng, 60)
@@ -55,4 +57,4 @@ def test_sets_do_not_depend_on_how_the_inputs_interleave(name):
         found += len(expected)
         for _ in range(3):
             assert _sets(policy(), _in_turns(rng, streams)) == expected, seed
-    assert found > 300
+    assert found > 3 * _STREAMS

@@ -16,7 +16,7 @@ from tests.sync.support.streams import AGE_PENALTIES, MS, in_order
 
 DRIVER = Path(__file__).parent / "peer" / "message_filters_driver.cpp"
 HEADER = Path("/usr/include/message_filters/sync_policies/approximate_time.h")
-STREAMS = chosen(short=200, long=2_000)
+STREAMS = chosen(short=50, long=2_000)
 
 
 @pytest.fixture

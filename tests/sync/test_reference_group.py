@@ -6,10 +6,11 @@ from collections import Counter
 import pytest
 
 from syncrelay.sync import DropReason, Match, Message, Restamp
+from tests.faults.extent import chosen
 from tests.sync.support.reference_group import ByKey, ByStamp, ReferenceGroup
 from tests.sync.support.rigs import BY_CLOCK, POLICIES, START, TICK, Options, make_group, make_policy
 
-GROUPS = 400
+GROUPS = chosen(short=200, long=2_000)
 LAGS = (0,) * 8 + (1, 1, 2, 3, 5, 8, 13, 99, 100, 101, 102, 250)
 FALLS = (0,) * 40 + (1, 30)
 
