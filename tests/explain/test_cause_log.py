@@ -14,7 +14,7 @@ from syncrelay.explain.finding_log import Remark
 from tests.explain.scenario import S, Source, run
 from tests.faults.extent import chosen
 
-_SEEDS = range(chosen(short=10, long=300))
+_SEEDS = range(chosen(short=3, long=300))
 _FALLS_SILENT_S = 14.0
 _IS_BACK_S = 40.0
 _SECONDS = 75

@@ -9,11 +9,12 @@ import pytest
 
 from tests.explain.scenario import Source, Told, run
 from tests.explain.support.cases import said_of_cases
+from tests.faults.extent import chosen
 
 _SLOP_S = 0.02
 _HZ = 10
 _LASTS_S = 40
-_SEEDS = range(40)
+_SEEDS = range(chosen(short=15, long=40))
 
 
 @dataclass

@@ -9,6 +9,7 @@ import pytest
 from syncrelay.explain import ClockState, Endpoint, Standstill, Step
 from tests.explain.scenario import IMU, Noise, Source, Told, run
 from tests.explain.support.groups import S
+from tests.faults.extent import chosen
 
 REAL: Noise = {"jitter_ms": 1.0, "delay_jitter_ms": 2.0}
 SLOP = {"slop": "20ms"}
@@ -41,11 +42,6 @@ UNTYPED = {"topic_options": {"type": None}}
 
 # What is told, the code of its cause, the topics that this is about. The rigs of tests/scenarios are of more causes.
 CAUSES: dict[str, tuple[Callable[[], Told], str, tuple[str, ...]]] = {
-    "one of two inputs drifts from this machine's clock": (
-        lambda: a_pair(clock=lambda second: 0.001 * second),
-        "clock_drift",
-        ("/b",),
-    ),
     "both inputs drift": (
         lambda: run(
             Source("/a", 10, clock=lambda second: 0.001 * second, **REAL),
@@ -81,10 +77,6 @@ CAUSES: dict[str, tuple[Callable[[], Told], str, tuple[str, ...]]] = {
         (),
     ),
     **{
-        f"a clock is {clock} s ahead": (partial(a_pair, clock=lambda _, by=clock: by), "other_clock", ("/b",))
-        for clock in (-315_964_782, 37, -7200, -37.2)
-    },
-    **{
         f"the clock of all inputs steps by {by} s": (
             partial(all_of, clock=lambda second, by=by: 0.0 if second < 20 else by),
             "clock_step",
@@ -105,35 +97,15 @@ CAUSES: dict[str, tuple[Callable[[], Told], str, tuple[str, ...]]] = {
         ("/a", "/b"),
     ),
     "one message comes, and no other": (lambda: a_pair(sends=lambda second: second < 0.05), "silent", ("/b",)),
-    "every fifth stamp is zero": (
-        lambda: a_pair(stamp=lambda stamp: stamp if stamp // 100_000_000 % 5 else 0),
-        "unstamped",
-        ("/b",),
-    ),
-    "a publisher sends each stamp twice": (
-        lambda: run(
-            *(Source("/a", 10), Source("/b", 10)),
-            Source("/b", 10, phase_ms=1, stamp=lambda stamp: stamp - 1_000_000),
-            seconds=40,
-            options=SLOP,
-            **shown(lambda _: (Endpoint("/b_driver", IMU),)),
+    "a publisher returns with another type than was taken": (
+        lambda: a_pair(
+            sends=lambda second: second < 20,
+            more=shown(lambda second: (IMAGES if second > 20 else Endpoint("/b_driver", IMU),)),
+            **UNTYPED,
         ),
-        "duplicates",
+        "other_type",
         ("/b",),
     ),
-    **{
-        f"a publisher returns with another type{than}": (
-            partial(
-                a_pair,
-                sends=lambda second: second < 20,
-                more=shown(lambda second: (IMAGES if second > 20 else Endpoint("/b_driver", IMU),)),
-                **options,
-            ),
-            "other_type",
-            ("/b",),
-        )
-        for than, options in (("", {}), (" than was taken", UNTYPED))
-    },
     # At 4 Hz, half of the messages come between two sweeps of the lidar.
     **{
         f"an optional input of {hz} Hz comes after {delay_ms} ms": (
@@ -168,19 +140,6 @@ def test_only_the_cause_is_said(told_of, code, topics):
     assert len(told.warnings) <= 4
 
 
-@pytest.mark.parametrize(("before", "after"), [(30, 15), (10, 5), (10, 6.5), (10, 1)])
-def test_an_input_that_slows_down_is_told_by_its_rates(before, after):
-    sources = (
-        Source("/a", before, hz_at=lambda second: before if second < 40 else after, **REAL),
-        Source("/b", before, **REAL),
-    )
-    told = run(*sources, seconds=110, options={"slop": "8ms", "queue_size": 50})
-    assert told.says_only("slowed", "/a"), told.warnings
-    figures = told.facts.inputs[0].figures
-    assert figures.slowed_from_hz == pytest.approx(before, rel=0.05)
-    assert figures.pace_hz == pytest.approx(after, rel=0.05)
-
-
 def test_a_rate_that_wavers_between_the_limits_is_told_once():
     def hz(second):
         return 10 if second < 30 else 6.5 if second < 45 else 8 if int(second) % 10 < 5 else 7.5
@@ -213,43 +172,13 @@ def test_a_standstill_in_which_nothing_was_due_is_nobodys_fault():
     assert a_pair(more=more).warnings == []
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(chosen(short=1, long=20)))
 @pytest.mark.parametrize(
     "late", [Source("/gps", 1, delay_ms=80, delay_jitter_ms=30), Source("/camera", 5, delay_ms=700, delay_jitter_ms=60)]
 )
 def test_a_delay_that_varies_is_no_drift(late, seed):
     told = run(Source("/imu", 100), late, seconds=60, seed=seed, options={"slop": "10ms", "queue_size": 200})
     assert told.ever_found == set()
-
-
-@pytest.mark.parametrize("lag", [-1.0, 0.4, 2.4])
-def test_when_one_of_two_publishers_leaves_nothing_has_slowed_or_stepped(lag):
-    """The graph shows it some time before or after the last message."""
-    sources = (
-        Source("/camera", 10, node="/left", **REAL),
-        Source(
-            "/camera", 10, node="/right", phase_ms=50, clock=lambda _: -3.0, sends=lambda second: second < 30, **REAL
-        ),
-        Source("/lidar", 10, **REAL),
-    )
-
-    def publishers(topic, second):
-        there = [each.endpoint for each in sources if each.topic == topic]
-        return tuple(there[:1] if second > 30 + lag else there)
-
-    told = run(*sources, seconds=90, options=SLOP, publishers=publishers)
-    assert told.ever_found <= {"several_publishers", *(("slowed",) if lag > 2 else ())}
-    assert told.says_only("several_publishers", "/camera"), told.warnings
-
-
-def test_a_driver_that_is_started_again_at_a_lower_rate_has_slowed_down():
-    sources = Source("/a", 30, hz_at=lambda second: 30 if second < 30 else 10, **REAL), Source("/b", 30, **REAL)
-
-    def publishers(topic, second):
-        return () if topic == "/a" and 30 < second < 33 else (Endpoint(f"{topic}_driver", IMU),)
-
-    told = run(*sources, seconds=70, options={"slop": "20ms"}, publishers=publishers)
-    assert "slowed" in told.codes
 
 
 @pytest.mark.parametrize("slower", [1.0, 0.5])
@@ -264,7 +193,7 @@ def test_what_comes_in_batches_has_the_pace_of_its_stamps(slower):
 
 
 @pytest.mark.parametrize("rest_s", [0.0, 0.8])
-@pytest.mark.parametrize("again_s", [20.4, 21.5, 23.2])
+@pytest.mark.parametrize("again_s", [20.4, 23.2])
 def test_what_is_sent_again_after_a_standstill_is_missed_because_of_it(again_s, rest_s):
     def received(at: float) -> float:
         return again_s if 17 < at < again_s else at

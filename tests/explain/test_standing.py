@@ -107,7 +107,7 @@ def _fault(
 
 
 def _cases(count: int) -> list[int]:
-    return list(range(count * 25 if IS_LONG else count // 3))
+    return list(range(count * 25 if IS_LONG else count // 7))
 
 
 @pytest.mark.parametrize("seed", _cases(15))

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from syncrelay.config.units import parse_duration
 from syncrelay.explain import Code, Finding, FindingLog, Severity
 from syncrelay.explain.changes import Change
 from syncrelay.explain.nearest import as_arrays
@@ -63,22 +62,6 @@ CAMERA = Source("/camera", hz=10, jitter_ms=0.5)
 LIDAR = Source("/lidar", hz=10, jitter_ms=0.5)
 
 
-@pytest.mark.parametrize("queue_size", [10, 161, 165])
-def test_a_queue_that_is_suggested_is_long_enough_at_once(queue_size):
-    imu = Source("/imu", hz=200, jitter_ms=0.3)
-    late = Source("/result", hz=2, delay_ms=800, delay_jitter_ms=40)
-    told, cured = rig(imu, late, slop="10ms", queue_size=queue_size)
-    assert told.codes == {"short_queue"}
-    assert_cured(cured, offered=1)
-
-
-def test_no_queue_is_suggested_where_stamps_are_never_within_slop():
-    told, _ = rig(replace(CAMERA, phase_ms=50), replace(LIDAR, delay_ms=900), slop="10ms", queue_size=5)
-    assert told.codes == {"over_slop"}
-    assert all(key != "queue_size" for line in told.warnings for key in re.findall(r"write `(\w+)", line.text))
-    assert told.facts.inputs[0].counts.needed_queue is None
-
-
 def test_a_slop_is_suggested_with_the_longer_queue_that_it_needs():
     told, cured = rig(replace(CAMERA, phase_ms=30), replace(LIDAR, delay_ms=900), slop="10ms", queue_size=5)
     assert re.search(r"write `slop: \w+` and `queue_size: \d+`, which would give", told.first.text)
@@ -95,55 +78,10 @@ def test_an_offset_is_offered_beside_the_slop_where_the_distance_is_constant():
     assert_cured(cured, offered=2)
 
 
-@pytest.mark.parametrize(("clock", "offset"), [(-0.08, "80ms"), (0.08, "-80ms")])
-def test_wrong_frames_are_not_paired_in_silence(clock, offset):
-    camera = replace(CAMERA, clock=lambda _: clock)
-    told = run(camera, LIDAR, seconds=30, options={"slop": "30ms"})
-    assert told.codes == {"constant_offset"}
-    assert re.search(
-        rf"write `offset: {offset}` at /camera, which would give (\d+) of \1 possible sets$", told.first.text
-    )
-    right = replace(camera, topic_options={"offset": offset})
-    assert run(right, LIDAR, seconds=30, options={"slop": "30ms"}).ever_found == set()
-
-
 def test_no_slop_that_would_pair_wrong_frames_is_suggested():
     _, cured = rig(replace(CAMERA, clock=lambda _: -0.08), LIDAR, slop="10ms")
     assert {key for finding, _, _ in cured for ((key, _, _),), _ in offers(finding)} == {"offset"}
     assert_cured(cured, offered=2)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("delay_ms", chosen(short=[80, 250], long=[30, 80, 100, 180, 250]))
-def test_a_constant_latency_is_no_constant_offset(delay_ms):
-    camera = replace(CAMERA, delay_ms=delay_ms, delay_jitter_ms=3)
-    assert run(camera, LIDAR, seconds=30, options={"slop": "20ms"}).ever_found == set()
-
-
-def test_inputs_that_run_free_of_each_other_have_no_constant_offset():
-    drifting = replace(CAMERA, hz=10.02, delay_ms=85)
-    assert "constant_offset" not in run(drifting, LIDAR, seconds=60, options={"slop": "60ms"}).ever_found
-
-
-def test_a_late_optional_input_is_told_with_a_wait_that_does():
-    result = Source("/result", hz=10, delay_ms=300, delay_jitter_ms=20, required=False)
-    told, cured = rig(CAMERA, LIDAR, result, slop="30ms", max_wait="100ms")
-    assert told.codes == {"waiting_for_optional"}
-    assert_cured(cured, offered=1)
-
-
-def test_stamps_that_are_never_equal_ask_for_another_policy():
-    told, cured = rig(Source("/camera", hz=10, phase_ms=0.014), Source("/lidar", hz=10), policy="exact_time")
-    assert "write `policy: approximate_time` and `slop: 14us`, which would give" in told.first.text
-    assert_cured(cured, offered=1)
-
-
-def test_what_is_held_is_told_with_an_age_that_does():
-    told, cured = rig(
-        CAMERA, Source("/map", hz=1, jitter_ms=1), policy="latest_time", trigger="/camera", max_age="100ms"
-    )
-    assert told.codes == {"over_slop"}
-    assert_cured(cured, offered=1)
 
 
 def test_no_slop_is_suggested_where_a_partner_is_missing():
@@ -151,35 +89,6 @@ def test_no_slop_is_suggested_where_a_partner_is_missing():
     told, cured = rig(Source("/imu", hz=10), replace(lidar, jitter_ms=0), CAMERA, slop="20ms")
     assert cured == []
     assert all("`slop" not in line.text for line in told.warnings)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("after", chosen(short=[3, 9.5], long=[0, 3, 8, 9.5]))
-@pytest.mark.parametrize("hz", chosen(short=[1, 30], long=[1, 5, 30]))
-def test_a_rig_that_starts_one_by_one_has_no_few_sets(hz, after):
-    late = Source("/lidar", hz=hz, jitter_ms=1, delay_ms=150, sends=lambda second: second >= after)
-    told = run(Source("/camera", hz=20, jitter_ms=1), late, seconds=30, options={"slop": "60ms", "queue_size": 60})
-    assert "few_sets" not in told.ever_found
-
-
-def test_a_pause_of_all_inputs_brings_no_few_sets():
-    paused = [replace(each, sends=lambda second: not 20 <= second < 24) for each in (CAMERA, LIDAR)]
-    assert "few_sets" not in run(*paused, seconds=50, options={"slop": "20ms"}).ever_found
-
-
-@pytest.mark.parametrize("hz", [4, 15, 30])
-def test_a_rate_that_changes_brings_no_few_sets(hz):
-    camera = replace(CAMERA, hz_at=lambda second: 10 if second < 25 else hz)
-    lidar = replace(LIDAR, hz=30)
-    assert "few_sets" not in run(camera, lidar, seconds=50, options={"slop": "60ms"}).ever_found
-
-
-def test_the_offset_of_another_clock_is_tried_and_cures():
-    ahead = Source("/lidar", hz=10, jitter_ms=0.5, clock=lambda _: 5.25)
-    told, cured = rig(CAMERA, ahead, slop="20ms")
-    assert told.codes == {"other_clock"}
-    assert re.search(r"`offset: -5.2[45]\d?s` at /lidar, which would give \d+ of \d+ possible sets", told.first.text)
-    assert_cured(cured, offered=1)
 
 
 def test_a_longer_queue_is_offered_for_stamps_that_seem_old_only_if_it_cures():
@@ -363,7 +272,7 @@ def _sources(draw):
     ]
 
 
-@settings(suppress_health_check=list(HealthCheck))
+@settings(max_examples=chosen(short=6, long=400), suppress_health_check=list(HealthCheck))
 @given(_sources(), st.sampled_from([1, 5, 20, 60]), st.sampled_from([2, 10, 40]))
 @pytest.mark.long
 def test_whatever_is_suggested_gives_what_it_promises_and_cures(sources, slop_ms, queue_size):
@@ -378,14 +287,10 @@ def test_whatever_is_suggested_gives_what_it_promises_and_cures(sources, slop_ms
         assert (finding.code, finding.input) not in {(each.code, each.input) for each in then.found[-1][1]}, finding
 
 
-def test_a_value_holds_what_its_text_says():
-    assert parse_duration("85ms") == 85 * MS
-
-
 _OPTIONAL = st.sampled_from([None, 200, 600])
 
 
-@settings(suppress_health_check=list(HealthCheck))
+@settings(max_examples=chosen(short=6, long=400), suppress_health_check=list(HealthCheck))
 @given(_sources(), st.sampled_from([1, 5, 20]), st.sampled_from([2, 10]), _OPTIONAL)
 @pytest.mark.long
 def test_all_findings_of_a_moment_name_one_value_for_a_key(sources, slop_ms, queue_size, late_ms):

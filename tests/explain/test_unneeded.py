@@ -16,8 +16,8 @@ from tests.faults.extent import chosen
 from tests.top.rigs import Sensor, simulated
 from tests.top.states import CLOUD, IMAGE, file, group
 
-_COUNTS = chosen(short=300, long=20_000)
-_RIGS = chosen(short=12, long=400)
+_COUNTS = chosen(short=80, long=20_000)
+_RIGS = chosen(short=3, long=400)
 _WANTING = sorted(FOR_WANT_OF_A_PARTNER, key=str)
 _OTHERS = sorted(set(DropReason) - FOR_WANT_OF_A_PARTNER - {DropReason.LATE}, key=str)
 

@@ -9,7 +9,7 @@ from syncrelay.status import Level, level
 from tests.explain.scenario import Source, Told, run
 from tests.faults.extent import chosen
 
-_SEEDS = range(chosen(short=6, long=200))
+_SEEDS = range(chosen(short=2, long=200))
 _SECONDS = 110
 _POLICIES = (
     {"slop": "30ms", "max_wait": "50ms"},
