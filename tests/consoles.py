@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from tests import preloaded
+from tests.cli.command import run_here
 from tests.cli.terminals import on_terminal
 from tests.ros.processes import Process, ros_environment, wait_until
 
@@ -34,6 +35,8 @@ _INSTALLS: Final = ("pip",)
 _LIVE: Final = frozenset(
     ("--live", "--from-graph", "--url", "observe", "top", "tap", "reload", "--watch", "--ros-args")
 )
+# Commands that start no thread or process and set up no log.
+_NEEDS_NO_PROCESS: Final = ("analyze", "diff", "graph", "init", "replay", "schema", "test", "validate")
 _UNITS: Final = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0}
 _NUMBER: Final = re.compile(r"(:?)(?<![\w.])[-+]?(\d+(?:\.\d+)?)(?: ?(ns|us|ms|s|min|Hz|%|[kM]?B)\b)?")
 # The largest factor between a shown and a measured figure.
@@ -162,7 +165,10 @@ class Reader:
         elif _stays(words):
             self._start(argv, command)
         else:
-            done = preloaded.run(argv, environ=self._environment, folder=self.folder)
+            if words[0] in _NEEDS_NO_PROCESS and not self.inside and "--into" not in words:
+                done = run_here(*words, folder=self.folder, environ=self._environment)
+            else:
+                done = preloaded.run(argv, environ=self._environment, folder=self.folder)
             allowed = (0, 1) if words[0] in _MAY_FIND else (0,)
             assert done.returncode in allowed, f"{command}: exit code {done.returncode}\n{done.stdout}{done.stderr}"
             assert "Traceback" not in done.stderr, done.stderr

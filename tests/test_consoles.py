@@ -15,7 +15,7 @@ import pytest
 
 from tests.cli.command import run
 from tests.consoles import Reader, blocks_of, commands_of, is_like, is_live
-from tests.faults.extent import IS_LONG
+from tests.faults.extent import IS_LONG, chosen
 from tests.recordings.bag.making import write_mcap
 from tests.recordings.datasets.drives import START, image, joints
 from tests.ros.cdr_messages import STORE, serialize
@@ -112,11 +112,12 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, text in _FILES.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text)
-    for words in (("--record", "rig.mcap"), ("--record", "short.mcap", "--seconds", "2"), ("--show-config",)):
+    recorded = {"short.mcap": "2"} | chosen(short={}, long={"rig.mcap": "30"})
+    for words in (*(("--record", name, "--seconds", lasts) for name, lasts in recorded.items()), ("--show-config",)):
         done = run("demo", *words, folder=folder)
         assert done.returncode == 0, done.stderr
     (folder / "demo.yaml").write_text(done.stdout)
-    for name in _RECORDINGS:
+    for name in (*_RECORDINGS, *chosen(short=("rig",), long=())):
         path = folder / f"{name}.mcap"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.hardlink_to(folder / "short.mcap")

@@ -2,7 +2,6 @@
 
 import re
 import runpy
-import subprocess
 import sys
 from pathlib import Path
 
@@ -18,12 +17,6 @@ _ROOT = Path(__file__).parents[1]
 _EXAMPLES = _ROOT / "examples"
 _LIBRARY = (_ROOT / "docs/reference/library.md").read_text()
 _SHOWN = re.findall(r"^```python\n(.*?)^```\n\n```text\n(.*?)^```", _LIBRARY, re.DOTALL | re.MULTILINE)
-
-
-def _run(*words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, str(_EXAMPLES / words[0]), *words[1:]], capture_output=True, text=True, check=True, timeout=120
-    )
 
 
 @pytest.mark.parametrize(("program", "printed"), _SHOWN)
@@ -47,17 +40,20 @@ def test_every_example_is_named_with_what_it_shows():
     assert [each.name for each in _EXAMPLES.glob("*.py") if f"({each.name})" not in page] == []
 
 
-def test_rows_of_csv_files_are_matched_and_each_is_accounted_for(tmp_path):
+def test_rows_of_csv_files_are_matched_and_each_is_accounted_for(tmp_path, monkeypatch, capsys):
     (tmp_path / "left.csv").write_text("10.00,a\n10.10,b\n10.20,c\n")
     (tmp_path / "right.csv").write_text("10.012,x\n10.15,y\n10.201,z\n10.3,q\n")
-    done = _run("match_csv.py", "0.02", str(tmp_path / "left.csv"), str(tmp_path / "right.csv"))
-    assert done.stdout.split() == ["10.00,a,10.012,x", "10.20,c,10.201,z"]
-    left, right = done.stderr.splitlines()
+    words = ["match_csv.py", "0.02", str(tmp_path / "left.csv"), str(tmp_path / "right.csv")]
+    monkeypatch.setattr(sys, "argv", words)
+    runpy.run_path(str(_EXAMPLES / words[0]), run_name="__main__")
+    printed, told = capsys.readouterr()
+    assert printed.split() == ["10.00,a,10.012,x", "10.20,c,10.201,z"]
+    left, right = told.splitlines()
     assert left.endswith("left.csv: 3 rows, 2 matched; 1 no partner near enough")
     assert "right.csv: 4 rows, 2 matched; " in right
 
 
-def test_sets_of_a_recording_are_read_as_tables(tmp_path):
+def test_sets_of_a_recording_are_read_as_tables(tmp_path, monkeypatch, capsys):
     pytest.importorskip("pyarrow")
     begin, step = 10**18, 10**8
     frames = [
@@ -68,5 +64,6 @@ def test_sets_of_a_recording_are_read_as_tables(tmp_path):
     recording = write_mcap(tmp_path / "drive.mcap", frames)
     group = {"policy": "approximate_time", "slop": "20ms", "topics": inputs({"/left": VECTOR, "/right": VECTOR})}
     (tmp_path / "fusion.yaml").write_text(config({"fused": group}))
-    done = _run("read_recording.py", str(tmp_path / "fusion.yaml"), str(recording))
-    assert "sets of /left, /right: 4.00 ms apart on average" in done.stdout
+    monkeypatch.setattr(sys, "argv", ["read_recording.py", str(tmp_path / "fusion.yaml"), str(recording)])
+    runpy.run_path(str(_EXAMPLES / "read_recording.py"), run_name="__main__")
+    assert "sets of /left, /right: 4.00 ms apart on average" in capsys.readouterr().out

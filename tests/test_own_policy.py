@@ -280,7 +280,7 @@ def folders(tmp_path: Path) -> Iterator[Path]:
 
 
 def test_policies_may_share_a_key_of_one_type_and_none_of_two(folders: Iterator[Path]):
-    seed, draws = 2228, chosen(short=12, long=300)
+    seed, draws = 2228, chosen(short=6, long=300)
     chance = random.Random(seed)
     for n, folder in zip(range(draws), folders, strict=False):
         key, first = chance.choice(["window", "window", *_THERE]), chance.randrange(len(_KINDS))

@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -14,6 +12,7 @@ from syncrelay.config.difference import difference, difference_lines
 from syncrelay.config.file import file_format
 from syncrelay.config.graph import as_mermaid, as_text, drawing_of
 from syncrelay.recordings.cases import check, load_suite_text
+from tests.cli.command import run_here
 from tests.sync.support.timeline import play_group
 from tests.test_launch_files import declared
 
@@ -104,11 +103,9 @@ def _is_known_install(words):
 def _is_syncrelay_command(words):
     # The help of a command, or of the relay, names all of its options.
     command = [] if words[0].startswith("-") else [words[0]]
-    run = subprocess.run(
-        [sys.executable, "-m", "syncrelay", *command, "--help"], capture_output=True, text=True, check=False
-    )
+    shown = run_here(*command, "--help", folder=_ROOT)
     options = [word for word in words if word.startswith("--")]
-    return run.returncode == 0 and all(option in run.stdout for option in options)
+    return shown.returncode == 0 and all(option in shown.stdout for option in options)
 
 
 def test_a_command_that_does_not_exist_would_be_noticed():
@@ -120,13 +117,7 @@ def test_a_command_that_does_not_exist_would_be_noticed():
 def test_the_error_that_a_page_shows_is_the_one_that_comes(tmp_path):
     shown = {text.strip() for _, text in _BLOCKS if text.startswith("fusion.yaml:") and "slopp" in text}
     (tmp_path / "fusion.yaml").write_text(_FILES[0].replace("slop:", "slopp:"))
-    run = subprocess.run(
-        [sys.executable, "-m", "syncrelay", "validate", "fusion.yaml"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    run = run_here("validate", "fusion.yaml", folder=tmp_path)
     assert run.returncode == 1
     assert shown == {(run.stdout + run.stderr).strip()}
 

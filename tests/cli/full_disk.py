@@ -84,7 +84,8 @@ def tries(folder: Path, sizes: int, seed: str) -> dict[str, Any]:
         whole, used = disk.content(), disk.used()
         rows = []
         for _ in range(sizes):
-            size = chance.randrange(max(1, used // _PAGE)) * _PAGE
+            # One page is held.
+            size = chance.randrange(max(1, used // _PAGE - 1)) * _PAGE
             disk.begin(size)
             full = run_here(*words, folder=disk.folder)
             left = disk.content()

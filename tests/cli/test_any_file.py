@@ -24,7 +24,7 @@ from tests.faults.extent import chosen
 from tests.recordings.bag.making import write_mcap
 from tests.ros.frames import Frame
 
-_PARTS, _FILES_A_PART = chosen(short=(4, 4), long=(240, 25))
+_PARTS, _FILES_A_PART = chosen(short=(2, 3), long=(240, 25))
 _SEED = chosen(short="any file", long=os.urandom(4).hex())
 _BLOCK = re.compile(r"^```yaml\n(version:.*?)^```", re.DOTALL | re.MULTILINE)
 _PAGES = [ROOT / "README.md", *(ROOT / "docs").glob("*/*.md")]
@@ -40,7 +40,7 @@ _SHIPPED |= {
 
 
 @pytest.mark.faults
-@pytest.mark.parametrize("name", sorted(_SHIPPED)[:: chosen(short=4, long=1)])
+@pytest.mark.parametrize("name", sorted(_SHIPPED)[:: chosen(short=10, long=1)])
 def test_every_command_takes_every_file_that_is_shipped(name, tmp_path):
     _try(_SHIPPED[name], tmp_path, f"{_SEED} {name}")
 

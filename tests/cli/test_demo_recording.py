@@ -18,7 +18,7 @@ _WITHOUT_ROS = "import sys; sys.modules['rclpy'] = None; from syncrelay.cli impo
 def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("demo")
     (made / "demo.yaml").write_text(shipped_config())
-    done = run_python("-c", _WITHOUT_ROS, "demo", "--record", "rig.mcap", "--seconds", "10", folder=made)
+    done = run_python("-c", _WITHOUT_ROS, "demo", "--record", "rig.mcap", "--seconds", "3", folder=made)
     assert (done.returncode, done.stderr) == (0, "")
     return made
 
@@ -30,7 +30,7 @@ def test_it_holds_what_the_rig_sends(folder):
             each.topic: reader.deserialize(raw, each.msgtype) for each, _, raw in reader.messages()
         }
         received = [(time, read_stamp(raw)) for _, time, raw in reader.messages()]
-    assert counts == {sensor.topic: pytest.approx(10 * sensor.rate_hz, rel=0.05) for sensor in SENSORS.values()}
+    assert counts == {sensor.topic: pytest.approx(3 * sensor.rate_hz, rel=0.1) for sensor in SENSORS.values()}
     camera, lidar, imu = (first[sensor.topic] for sensor in SENSORS.values())
     assert (camera.width, camera.encoding, len(camera.data)) == (640, "rgb8", 640 * 480 * 3)
     assert lidar.width * lidar.height == 20_000
@@ -43,12 +43,12 @@ def test_it_holds_what_the_rig_sends(folder):
 def test_the_shipped_file_gives_sets_of_it(folder):
     done = run_here("replay", "rig.mcap", "--config", "demo.yaml", folder=folder)
     assert done.returncode == 0
-    assert all(group.sets > 90 for group in read_summary(done.stdout).values())
+    assert all(group.sets > 25 for group in read_summary(done.stdout).values())
 
 
 def test_a_seed_repeats_it(folder, tmp_path):
-    run_here("demo", "--record", str(tmp_path / "same.mcap"), "--seconds", "10", folder=folder)
-    run_here("demo", "--record", str(tmp_path / "other.mcap"), "--seconds", "10", "--seed", "1", folder=folder)
+    run_here("demo", "--record", str(tmp_path / "same.mcap"), "--seconds", "3", folder=folder)
+    run_here("demo", "--record", str(tmp_path / "other.mcap"), "--seconds", "3", "--seed", "1", folder=folder)
     content = (folder / "rig.mcap").read_bytes()
     assert (tmp_path / "same.mcap").read_bytes() == content
     assert (tmp_path / "other.mcap").read_bytes() != content

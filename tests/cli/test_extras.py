@@ -4,6 +4,7 @@ In `make test` a process hides what no base dependency brings; `make test-bare` 
 """
 
 import importlib.metadata
+import json
 import os
 import re
 import subprocess
@@ -20,21 +21,27 @@ from tests.cli.command import GOOD, ROOT, example
 
 _PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 _BARE = os.environ.get("SYNCRELAY_BARE")
-# Hides all packages but the named ones, runs a command, and says at the end which slow packages were imported.
-_HIDING = """
-import atexit, sys
-given = set(sys.argv.pop(1).split(","))
+# Hides all packages but the named ones where some are named, runs commands, and prints as JSON how each went: its code,
+# what it printed, and which slow packages were imported by its end.
+_RUNS = """
+import json, sys
+from contextlib import redirect_stderr, redirect_stdout
 from importlib.machinery import PathFinder
+given = set(filter(None, sys.argv[1].split(",")))
 class Hiding:
     @staticmethod
     def find_spec(name, path=None, target=None):
         is_given = name.partition(".")[0] in given or name.startswith("_sysconfigdata")
         return PathFinder.find_spec(name, path, target) if is_given else None
-sys.meta_path[sys.meta_path.index(PathFinder)] = Hiding
-slow = ("pydantic", "yaml", "numpy", "asyncio", "rclpy")
-atexit.register(lambda: print("slow:", *(each for each in slow if each in sys.modules), file=sys.stderr))
+if given:
+    sys.meta_path[sys.meta_path.index(PathFinder)] = Hiding
 from syncrelay.cli import main
-sys.exit(main())
+slow, told = ("pydantic", "yaml", "numpy", "asyncio", "rclpy"), []
+for words in json.loads(sys.argv[2]):
+    with open("out", "w") as out, open("talk", "w") as talk, redirect_stdout(out), redirect_stderr(talk):
+        code = main(words)
+    told.append((code, open("out").read(), open("talk").read(), [each for each in slow if each in sys.modules]))
+print(json.dumps(told))
 """
 
 
@@ -56,14 +63,20 @@ def _modules(distributions: set[str]) -> set[str]:
     return {name for name, those in of_each.items() if distributions & set(map(canonicalize_name, those))}
 
 
-def _run(words, folder):
-    base = _modules(_distributions([Requirement(each) for each in _PROJECT["dependencies"]]))
+def _run(commands, folder):
+    """How each of these commands went, by its words."""
+    for file in ("fusion.yaml", "wider.yaml"):
+        (folder / file).write_text(GOOD)
     if _BARE is None:
+        base = _modules(_distributions([Requirement(each) for each in _PROJECT["dependencies"]]))
         given = ",".join(sorted({*base, *sys.stdlib_module_names, "syncrelay"}))
-        argv, environ = [sys.executable, "-c", _HIDING, given, *words], {**os.environ, "PYTHONPATH": str(ROOT)}
+        argv, environ = [sys.executable, "-c"], {**os.environ, "PYTHONPATH": str(ROOT)}
     else:
-        argv, environ = [_BARE, "-I", "-m", "syncrelay", *words], dict(os.environ)
-    return subprocess.run(argv, cwd=folder, env=environ, capture_output=True, text=True, check=False, timeout=120)
+        given, argv, environ = "", [_BARE, "-I", "-c"], dict(os.environ)
+    argv += [_RUNS, given, json.dumps(commands)]
+    done = subprocess.run(argv, cwd=folder, env=environ, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return dict(zip(map(tuple, commands), json.loads(done.stdout), strict=True))
 
 
 _TOLD = re.compile(r"pip install 'syncrelay\[([a-z,]+)\]'")
@@ -89,14 +102,12 @@ def _missing(name: str, *words: str) -> list[str]:
     return [each.extra for each in command.needs if each.applies(arguments)]
 
 
-@pytest.mark.parametrize("words", [each for each in _WORDS if _missing(*each)], ids=" ".join)
-def test_a_command_whose_extra_is_missing_says_what_to_type_before_anything_slow_is_imported(words, tmp_path):
-    done = _run(words, tmp_path)
-    assert (done.returncode, done.stdout) == (69, ""), done.stderr
-    assert done.stderr.startswith(f"syncrelay: {words[0]} needs Python packages that are not installed: ")
-    assert _TOLD.findall(done.stderr) == [",".join(_missing(*words))]
-    if _BARE is None:
-        assert done.stderr.splitlines()[-1] == "slow:"
+def test_a_command_whose_extra_is_missing_says_what_to_type_before_anything_slow_is_imported(tmp_path):
+    for words, (code, printed, told, slow) in _run([each for each in _WORDS if _missing(*each)], tmp_path).items():
+        assert (code, printed) == (69, ""), (words, told)
+        assert told.startswith(f"syncrelay: {words[0]} needs Python packages that are not installed: ")
+        assert _TOLD.findall(told) == [",".join(_missing(*words))]
+        assert slow == [], words
 
 
 @pytest.mark.parametrize(("package", "extra"), [("mcap", "[recordings]"), ("pydantic", "")])
@@ -114,22 +125,18 @@ _OTHERS = [each for each in _WORDS if not _missing(*each) and each[0] != "demo"]
 _ASK = ("tap", "reload", "top")
 
 
-@pytest.mark.parametrize("words", [*_OTHERS, ["demo", "--show-config"]], ids=" ".join)
-def test_every_other_command_runs_on_what_the_base_installation_brings(words, tmp_path):
-    for file in ("fusion.yaml", "wider.yaml"):
-        (tmp_path / file).write_text(GOOD)
-    done = _run([*words, "--url", "localhost:1"] if words[0] in _ASK else words, tmp_path)
-    assert done.returncode in {0, 1}, done.stderr
-    assert "Traceback" not in done.stderr
-    assert "lacks a Python package" not in done.stderr
+def test_every_other_command_runs_on_what_the_base_installation_brings(tmp_path):
+    commands = [[*each, "--url", "localhost:1"] if each[0] in _ASK else each for each in _OTHERS]
+    for words, (code, _, told, _) in _run([*commands, ["demo", "--show-config"]], tmp_path).items():
+        assert code in {0, 1}, (words, told)
+        assert "Traceback" not in told
+        assert "lacks a Python package" not in told
 
 
-@pytest.mark.parametrize("words", [["--config", "fusion.yaml"], ["demo"]])
-def test_the_relay_and_the_demo_lack_nothing_but_ros(words, tmp_path):
-    (tmp_path / "fusion.yaml").write_text(GOOD)
-    done = _run(words, tmp_path)
-    assert (done.returncode, done.stdout) == (69, "")
-    assert "rclpy" in done.stderr
+def test_the_relay_and_the_demo_lack_nothing_but_ros(tmp_path):
+    for words, (code, printed, told, _) in _run([["--config", "fusion.yaml"], ["demo"]], tmp_path).items():
+        assert (code, printed) == (69, ""), words
+        assert "rclpy" in told
 
 
 @pytest.mark.parametrize("extra", EXTRAS)

@@ -10,16 +10,15 @@ import pytest
 import yaml
 
 from tests.cli.command import GOOD, ROOT, run_here
-from tests.cli.full_disk import COMMANDS
 from tests.cli.test_export_lerobot import FILE
 from tests.doctor.environments import namespaces
+from tests.faults.extent import chosen
 from tests.recordings.bag.making import rig, write_mcap
 from tests.recordings.datasets.drives import drive
 from tests.ros.cdr_messages import VECTOR
 
-_LONG = os.environ.get("SYNCRELAY_FAULTS") == "long"
-_SIZES = 20 if _LONG else 3
-_SEED = os.urandom(4).hex() if _LONG else "full disk"
+_SIZES = chosen(short=1, long=20)
+_SEED = chosen(short="full disk", long=os.urandom(4).hex())
 _MOUNTS = ("--mount", "--map-root-user")
 # Slop is too small, so that there are values to suggest.
 _FUSION = {
@@ -29,35 +28,27 @@ _FUSION = {
 }
 
 
-@pytest.fixture(scope="module")
-def told(tmp_path_factory):
-    mounts = namespaces(*_MOUNTS)
-    folder = tmp_path_factory.mktemp("full")
-    write_mcap(folder / "rig.mcap", rig(400))
-    drive(folder / "drive.mcap")
-    (folder / "lerobot.yaml").write_text(FILE)
-    (folder / "fusion.yaml").write_text(yaml.safe_dump({"version": 1, "groups": {"front": _FUSION}}))
-    argv = [*mounts, sys.executable, "-m", "tests.cli.full_disk", _SEED, str(_SIZES), str(folder)]
+@pytest.mark.faults
+def test_a_full_disk_is_said_and_the_command_succeeds_once_there_is_room(tmp_path):
+    write_mcap(tmp_path / "rig.mcap", rig(400))
+    drive(tmp_path / "drive.mcap")
+    (tmp_path / "lerobot.yaml").write_text(FILE)
+    (tmp_path / "fusion.yaml").write_text(yaml.safe_dump({"version": 1, "groups": {"front": _FUSION}}))
+    argv = [*namespaces(*_MOUNTS), sys.executable, "-m", "tests.cli.full_disk", _SEED, str(_SIZES), str(tmp_path)]
     done = subprocess.run(argv, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
-
-
-@pytest.mark.faults
-@pytest.mark.parametrize("name", COMMANDS)
-def test_a_full_disk_is_said_and_the_command_succeeds_once_there_is_room(told, name):
-    one = told[name]
-    assert one["code"] == 0, one["stderr"]
-    for each in one["tries"]:
-        case = f"seed {_SEED}: {json.dumps(each, indent=2)}"
-        assert each["code"] in (0, 1), case
-        assert "Traceback" not in each["stderr"], case
-        if each["code"]:
-            assert "No space left on device" in each["stderr"] or "no space left" in each["stderr"], case
-            assert each["broken"] == [], case
-        assert each["again"][0] == 0 or each["code"] == 0, case
-        assert each["same"], case
-    assert any(each["code"] for each in one["tries"]), one
+    for name, one in json.loads(done.stdout).items():
+        assert one["code"] == 0, (name, one["stderr"])
+        for each in one["tries"]:
+            case = f"seed {_SEED}: {name}: {json.dumps(each, indent=2)}"
+            assert each["code"] in (0, 1), case
+            assert "Traceback" not in each["stderr"], case
+            if each["code"]:
+                assert "No space left on device" in each["stderr"] or "no space left" in each["stderr"], case
+                assert each["broken"] == [], case
+            assert each["again"][0] == 0 or each["code"] == 0, case
+            assert each["same"], case
+        assert any(each["code"] for each in one["tries"]), (name, one)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")

@@ -20,6 +20,7 @@ from syncrelay.top.app import TopApp
 from syncrelay.top.client import ask
 from tests.cli.command import BAD, GOOD
 from tests.cli.terminals import shown_on_terminal
+from tests.faults.extent import chosen
 from tests.hostile_names import assert_shown_safely, hostile_name
 from tests.recordings.bag.making import rig
 from tests.ros.cdr_messages import STORE, VECTOR
@@ -28,7 +29,7 @@ from tests.top import states
 from tests.top.speaker import answering, speaking
 from tests.top.terminal import Terminal
 
-pytestmark = pytest.mark.parametrize("seed", range(3))
+pytestmark = pytest.mark.parametrize("seed", range(chosen(short=1, long=20)))
 _GOOD = ("/camera", "/lidar")
 
 

@@ -19,6 +19,7 @@ from syncrelay.recordings.analysis.streams import read_streams
 from syncrelay.recordings.bag import open_recording
 from syncrelay.recordings.bag.bindings import bind
 from tests.cli.command import run_here
+from tests.faults.extent import chosen
 from tests.recordings.bag.making import write_mcap
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
@@ -27,7 +28,7 @@ from tests.ros.streams import BEGIN, MS, at
 from tests.ros.summary import read_summary
 
 _SETS = 150
-_DRAWN = 12
+_DRAWN = chosen(short=4, long=40)
 _VALUE = re.compile(r"`(slop|queue_size|max_wait|policy|offset): ([^`]+)`(?: at (/\w+))?")
 
 
