@@ -24,22 +24,27 @@ class Kind:
 
     begin: _Begin
     needs: tuple[str, ...]
-    """`sensor` or `group` where it is about one; `sim`, `real`, `managed`, `several` where the world must be so."""
+    """`sensor` or `group` where it is about one; `sim`, `real`, `played`, `managed`, `several` where the world must be
+    so; `brief` where it is over at once; `start` where it begins with the world."""
     names: frozenset[str]
     """The first finding of the groups that it concerns is one of these, if any; `starting` and `healthy` go without."""
     must: bool
     """Whether there must be one, where nothing makes up for it."""
     spoils: bool
     """Whether sets may be missing meanwhile."""
+    again_s: float = 15.0
+    """How long after its end they may be missing."""
 
 
 KINDS: Final[dict[str, Kind]] = {}
 
 
-def _kind(*needs: str, names: str = "", must: bool = False, spoils: bool = True) -> Callable[[_Begin], _Begin]:
+def _kind(
+    *needs: str, names: str = "", must: bool = False, spoils: bool = True, again_s: float = 15.0
+) -> Callable[[_Begin], _Begin]:
     def add(begin: _Begin) -> _Begin:
         name = begin.__name__
-        KINDS[name] = Kind(begin, needs, frozenset(names.split()), must, spoils)
+        KINDS[name] = Kind(begin, needs, frozenset(names.split()), must, spoils, again_s)
         return begin
 
     return add
@@ -136,7 +141,7 @@ def dies_in_write(world: World, target: str, _: float) -> End:
     return back
 
 
-@_kind("sensor", names="no_publisher silent")
+@_kind("sensor", "brief", names="no_publisher silent")
 def restarts(world: World, target: str, _: float) -> End:
     """The driver ends and comes back at once."""
     _returning(world, target)
@@ -221,10 +226,13 @@ def stall(world: World, _: str, seconds: float) -> End:
     return None
 
 
-@_kind("real", names="clock_step")
+@_kind("real", "brief", names="clock_step")
 def clock_set(world: World, _: str, __: float) -> End:
     """This machine's clock is set."""
-    world.set_clock(world.random.choice([-90, -2, 3, 3600]) * SECOND)
+    by = world.random.choice([-3600, -90, -2, 3, 3600]) * SECOND
+    # Two that set it against each other do so by turns.
+    for number in range(world.random.choice([1, 1, 3])):
+        world.scheduler.after(number * 2500 * MS, partial(world.set_clock, -by if number % 2 else by))
     return None
 
 
@@ -276,7 +284,7 @@ def services(world: World, _: str, __: float) -> End:
     return partial(world.ask, "status")
 
 
-@_kind(spoils=False)
+@_kind("brief", spoils=False)
 def reload_same(world: World, _: str, __: float) -> End:
     """The file is read again, and says the same."""
     world.reload()
@@ -297,7 +305,7 @@ def reload_faulty(world: World, _: str, __: float) -> End:
     return mend
 
 
-@_kind("group", names="no_publisher silent")
+@_kind("group", "brief", names="no_publisher silent")
 def reload_changed(world: World, target: str, _: float) -> End:
     """A group is exchanged for one of other values."""
     world.changed[target] = world.changed.get(target, 0) + 1
@@ -365,27 +373,32 @@ def configure_again(world: World, _: str, __: float) -> End:
 @_kind("sim", names="clock_stopped no_clock silent time_jump", must=True)
 def clock_stops(world: World, _: str, __: float) -> End:
     """The simulation stands still, and goes on where it was."""
-    world.sim_stopped = world.scheduler.now
+    world.stop_rig_clock()
     ends = [_set(world, topic, is_silent=True) for topic in world.drivers]
 
     def go_on() -> None:
-        if world.sim_stopped is not None:
-            world.sim_offset -= world.scheduler.now - world.sim_stopped
-            world.sim_stopped = None
+        world.go_on_with_rig_clock()
         for end in ends:
             end()
 
     return go_on
 
 
-@_kind("sim", names="time_jump clock_step")
+@_kind("sim", "brief", names="time_jump clock_step")
 def clock_loops(world: World, _: str, __: float) -> End:
     """The simulation begins again."""
-    world.sim_offset = -world.scheduler.now
+    world.shift_rig_clock(-world.stamp_at(world.scheduler.now))
     return None
 
 
-@_kind("sensor", names="slowed bursts")
+@_kind("real", "played", "brief", names="time_jump clock_step", again_s=0.05)
+def loops(world: World, _: str, __: float) -> End:
+    """All sensors begin again, as a recording that is played in a loop."""
+    world.shift_rig_clock(-world.random.choice([20, 600]) * SECOND)
+    return None
+
+
+@_kind("sensor", names="slowed bursts over_slop")
 def doubles(world: World, target: str, _: float) -> End:
     """The driver sends every message again, half a period later."""
     return _set(world, target, is_doubled=True)
@@ -415,7 +428,7 @@ def refuse_subscriptions(world: World, target: str, _: float) -> End:
     return relent
 
 
-@_kind(spoils=False)
+@_kind("brief", spoils=False)
 def file_in_parts(world: World, _: str, __: float) -> End:
     """The file is written anew in two parts; who watches it waits until it rests."""
     whole = world.file()
@@ -437,9 +450,30 @@ def file_gone(world: World, _: str, __: float) -> End:
     return back
 
 
-@_kind(spoils=False)
+@_kind("brief", spoils=False)
 def reload_often(world: World, _: str, __: float) -> End:
     """Somebody sends SIGHUP and calls ~/reload at once, many times."""
     for after in range(12):
         world.scheduler.after(after * 20 * MS, world.reload)
     return None
+
+
+@_kind("start", names="refused_by_dds")
+def refuse_output(world: World, _: str, __: float) -> End:
+    """From the start on DDS makes nothing on one of the outputs."""
+    world.refused_output = world.random.choice(list(world.outputs))
+
+    def relent() -> None:
+        world.refused_output = None
+
+    return relent
+
+
+@_kind("sensor", names="no_publisher alone silent slowed", must=True)
+def returns_silent(world: World, target: str, seconds: float) -> End:
+    """The driver ends, and comes back with nothing to send."""
+    driver = world.drivers[target]
+    driver.leave()
+    end = _set(world, target, is_silent=True)
+    world.scheduler.after(round(seconds / 3 * SECOND), driver.start)
+    return end

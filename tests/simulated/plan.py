@@ -220,7 +220,7 @@ def _group(chance: Random, name: str, sensors: Sequence[Sensor], *, exact: bool,
         inputs[chosen[-1].topic] = {"required": False}
         if policy != "latest_time":
             options["max_wait"] = "300ms"
-    if chance.random() < 0.2:
+    if chance.random() < 0.3:
         options["lazy"] = True
     if chance.random() < 0.2:
         options["manifest"] = False
@@ -243,7 +243,9 @@ def _options(policy: str, first: str, hz: float) -> dict[str, Any]:
 def _steps(chance: Random, plan: Plan, kinds: Mapping[str, Sequence[str]], *, chaotic: bool) -> Iterator[Step]:
     """Draw what happens: one fault after the other, each healed before the next; or, in chaos, all at once."""
     at = SETTLED_S + chance.uniform(0, 10)
-    fit = [kind for kind, needs in kinds.items() if _fits(plan, needs)]
+    fit = [kind for kind, needs in kinds.items() if _fits(plan, needs) and (chaotic or "start" not in needs)]
+    # A few kinds again and again meet in more ways than one of each.
+    fit = chance.sample(fit, k=chance.choice([4, 8, len(fit)])) if chaotic else fit
     for _ in range(chance.randint(4, 14) if chaotic else chance.choice([1, 1, 2, 3])):
         kind = chance.choice(fit)
         target = ""
@@ -251,10 +253,13 @@ def _steps(chance: Random, plan: Plan, kinds: Mapping[str, Sequence[str]], *, ch
             target = chance.choice(plan.sensors).topic
         elif "group" in kinds[kind]:
             target = chance.choice(plan.groups).name
+        is_brief = "brief" in kinds[kind]
         if chaotic:
-            yield Step(chance.uniform(2, 60), kind, target, chance.choice([0.3, 3.0, chance.uniform(0, 30)]))
+            begin = 0.0 if "start" in kinds[kind] else chance.uniform(2, 60)
+            seconds = chance.choice([0.3, 3.0, chance.uniform(0, 30)])
+            yield Step(begin, kind, target, 0.0 if is_brief else seconds)
             continue
-        seconds = chance.uniform(NAMED_S + 5, NAMED_S + 25)
+        seconds = 0.0 if is_brief else chance.uniform(NAMED_S + 5, NAMED_S + 25)
         yield Step(at, kind, target, seconds)
         at += seconds + HEALED_S + chance.uniform(15, 25)
 
@@ -264,5 +269,6 @@ def _fits(plan: Plan, needs: Sequence[str]) -> bool:
         ("sim" not in needs or plan.by_sim_time)
         and ("real" not in needs or not plan.by_sim_time)
         and ("managed" not in needs or plan.is_managed)
+        and ("played" not in needs or not any(each.by_clock for each in plan.groups))
         and ("several" not in needs or len(plan.groups) > 1)
     )

@@ -13,8 +13,8 @@ from syncrelay.collector import eased_collector
 from tests.simulated.faults import KINDS, needs
 from tests.simulated.plan import Plan, draw
 from tests.simulated.promises import Promises
-from tests.simulated.scheduler import SECOND, StuckError
-from tests.simulated.world import Line, World
+from tests.simulated.scheduler import MS, SECOND, StuckError
+from tests.simulated.world import Line, RelayProcess, World
 
 _LOG: Final = logging.getLogger("syncrelay")
 _LOOK_S: Final = 1.0
@@ -69,7 +69,7 @@ def _run(world: World, promises: Promises) -> list[str]:
             promises.look()
         relay = world.relay
         if relay is not None:
-            relay.end()
+            _end(world, relay)
             latest = world.now + _ENDS_S
             while not relay.has_ended and world.now < latest:
                 scheduler.sleep(0.1)
@@ -80,6 +80,14 @@ def _run(world: World, promises: Promises) -> list[str]:
     except Exception as error:  # noqa: BLE001  what the relay's threads raise
         promises.broken.append(f"{world.now:.2f} s: {error!r}\n{_trace(error)}")
     return promises.judge()
+
+
+def _end(world: World, relay: RelayProcess) -> None:
+    """Send SIGTERM while clients call, some of them too late."""
+    scheduler, chance = world.scheduler, world.random
+    for service in chance.choices(("status", "pause", "resume", "reload"), k=chance.randrange(6)):
+        scheduler.after(chance.randrange(300 * MS), partial(world.ask, service))
+    scheduler.after(chance.randrange(200 * MS), relay.end)
 
 
 def _trace(error: BaseException) -> str:

@@ -1,26 +1,35 @@
 """What must hold in every world, judged by what the world knows and not by what the relay says of itself."""
 
 import logging
+from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
+from math import ceil
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from syncrelay.explain import explanation
 from tests.simulated.bus import Sample, Writer
 from tests.simulated.faults import KINDS, concerns, is_felt
-from tests.simulated.plan import HEALED_S, NAMED_S, SETTLED_S, Group, Plan, Step
+from tests.simulated.plan import HEALED_S, NAMED_S, SETTLED_S, TYPE, Group, Plan, Step
 from tests.simulated.world import World, identity
 
 if TYPE_CHECKING:
     from syncrelay.explain import GroupReport
 
-# Sets are complete again so long after a fault has ended, and may be missing so long before it began.
+# After what is odd, so long; sets may be missing so long before a fault began.
 _AGAIN_S: Final = 15.0
 _BEFORE_S: Final = 2.5
 # A set may take so long beside what its policy waits for.
 _LATE_S: Final = 1.5
 _ANSWERED_S: Final = 15.0
+# A group is judged every second or so, an input that is served has this long to send, and a node's name comes by then.
+_JUDGED_S: Final = 12.0
+_ABOUT_TO_SEND_S: Final = 4.5
+_HERE_S: Final = 8.0
+_NAMED_BY_S: Final = 45.0
+# A lazy group sleeps so long after the last of those who listen has left.
+_ASLEEP_S: Final = 8.0
 _QUIET: Final = frozenset({"healthy", "starting", "nobody_listens"})
 # Messages are of no known moment, or cannot leave.
 _ODD: Final = frozenset({"doubles", "refuse_messages", "second_publisher", "other_clock", "unstamped"})
@@ -38,6 +47,22 @@ _SUBSCRIBES_AGAIN: Final = frozenset(
     }
 )
 _RETURNS: Final = frozenset({"dies", "dies_in_write", "leaves", "other_type", "restarts"})
+# Before its messages have come for a while, nothing is known of a group but what the graph shows.
+_AT_FIRST: Final = frozenset(
+    {
+        "no_publisher",
+        "silent",
+        "alone",
+        "no_clock",
+        "inactive",
+        "waiting_for_optional",
+        "few_sets",
+        "short_queue",
+        "bursts",
+    }
+)
+# Ticks come late, or all at once.
+_TICKS_LATE: Final = frozenset({"stall", "clock_set", "clock_stops", "clock_loops", "loops", "refuse_messages"})
 _BUGS: Final = ("a bug in syncrelay", "Traceback")
 
 
@@ -69,6 +94,9 @@ class Promises:
         self._open: dict[str, tuple[float, dict[int, int]]] = {}
         self._written: dict[str, dict[int, float]] = defaultdict(dict)
         self._reports: dict[str, GroupReport] = {}
+        self._judged: dict[str, float] = {}
+        self._nameless: dict[tuple[str, str], float] = {}
+        self._fed: dict[str, int] = {}
         world.bus.written = self._on_write
         world.heard_write = self._on_heard
         world.drained = self._on_drained
@@ -82,6 +110,12 @@ class Promises:
         if place is None or relay is None or writer.participant.process is not relay.process:
             return
         group, index = place
+        still = self.world.still_since
+        if still is not None and still < self.world.now:
+            self.broken.append(
+                f"{self.world.now:.2f} s: {group}: a set left, though nothing was to since {still:.2f} s"
+            )
+            self.world.still_since = None
         at, inputs = self._open.get(group, (0.0, {}))
         if inputs and (index <= max(inputs) or at != self.world.now):
             self._close(group)
@@ -108,8 +142,11 @@ class Promises:
         for report in relay.monitor.reports:
             name = report.facts.name
             if self._reports.get(name) is report:
+                self._look_for_unjudged(name)
                 continue
-            self._reports[name] = report
+            self._reports[name], self._judged[name] = report, self.world.now
+            self._look_for_nameless(report)
+            self._look_whether_asleep(report)
             for each in report.facts.inputs:
                 counts = each.counts
                 left = counts.matched + sum(counts.dropped.values()) + counts.buffered
@@ -122,6 +159,37 @@ class Promises:
             told = [(each.code, each.about, each.text) for each in report.findings]
             if len(set(told)) < len(told):
                 self.broken.append(f"{self.world.now:.2f} s: {name}: a finding is there twice: {told}")
+
+    def _look_for_unjudged(self, name: str) -> None:
+        now, before = self.world.now, self._judged[name]
+        if now - before > _JUDGED_S and not self._happened({"stall"}, before - 10, now):
+            self.broken.append(f"{now:.2f} s: {name} was judged last at {before:.2f} s")
+            self._judged[name] = now
+
+    def _look_for_nameless(self, report: "GroupReport") -> None:
+        for each in report.facts.inputs:
+            place = report.facts.name, each.name
+            if all(publisher.is_named for publisher in each.graph.publishers):
+                self._nameless.pop(place, None)
+                continue
+            since = self._nameless.setdefault(place, self.world.now)
+            if self.world.now - since > _NAMED_BY_S:
+                self.broken.append(f"{self.world.now:.2f} s: {place}: no name of a publisher since {since:.2f} s")
+                self._nameless[place] = self.world.now
+
+    def _look_whether_asleep(self, report: "GroupReport") -> None:
+        name, away = report.facts.name, self.world.witness.away_since
+        before, self._fed[name] = self._fed.get(name), sum(each.counts.fed for each in report.facts.inputs)
+        is_asleep = away is not None and self.world.now - away > _ASLEEP_S and "lazy" in self._group(name).options
+        if not is_asleep or self._happened({"stall"}, self.world.now - 30, self.world.now):
+            self._fed.pop(name)
+        elif before is not None and self._fed[name] > before:
+            self.broken.append(f"{self.world.now:.2f} s: {name} is fed, though nobody has listened since {away:.2f} s")
+
+    def _happened(self, kinds: Iterable[str], begin: float, end: float) -> bool:
+        return any(
+            step.kind in kinds and step.at <= end and begin <= step.at + step.seconds for step in self.world.plan.steps
+        )
 
     def _on_drained(self) -> None:
         self.look(is_last=True)
@@ -140,6 +208,7 @@ class Promises:
         for each in plan.groups:
             self.broken += self._wrong_sets(each)
             self.broken += self._missing_sets(each)
+            self.broken += self._wrong_ticks(each)
             self.broken += self._false_findings(each)
         return self.broken
 
@@ -190,8 +259,12 @@ class Promises:
     def _spoilt(self, group: Group) -> list[tuple[float, float]]:
         """Return the times in which sets of a group may be missing."""
         plan = self.world.plan
-        spoiling = (step for step in plan.steps if KINDS[step.kind].spoils and concerns(step.kind, step.target, group))
-        times = [(step.at - _BEFORE_S, step.at + step.seconds + _AGAIN_S) for step in spoiling]
+        spoiling = [step for step in plan.steps if KINDS[step.kind].spoils and concerns(step.kind, step.target, group)]
+        # The first trigger after a jump has nothing that is older.
+        at_least = 2.0 if group.repeats else 0.0
+        times = [
+            (each.at - _BEFORE_S, each.at + each.seconds + max(at_least, KINDS[each.kind].again_s)) for each in spoiling
+        ]
         return [(0.0, SETTLED_S), *times]
 
     def _is_calm(self, group: Group, at: float) -> bool:
@@ -227,14 +300,35 @@ class Promises:
                 yield f"{at:.2f} s: {group.name}: the set of message {number} of {anchor} left at {left.at:.2f} s"
                 return
 
+    def _wrong_ticks(self, group: Group) -> Iterator[str]:
+        """Yield where more or fewer sets left than there were ticks."""
+        if not group.by_clock or self.world.plan.by_sim_time:
+            return
+        times = [each.at for each in self.sets[group.name]]
+        for first in range(ceil(min(self.world.now, self.world.plan.length)) - 5):
+            last = first + 2
+            count = bisect_left(times, last) - bisect_left(times, first)
+            ticks = 2 * self.world.plan.hz
+            is_calm = self._is_calm(group, first) and self._is_calm(group, last)
+            many = count > ticks + 2 and not self._happened(_TICKS_LATE, first - 10, last)
+            if many or (count < ticks - 2 and is_calm):
+                yield f"{first} s: {group.name}: {count} sets in 2 s, of {ticks:g} ticks"
+                return
+
     def _false_findings(self, group: Group) -> Iterator[str]:
         plan = self.world.plan
         steps = [step for step in plan.steps if concerns(step.kind, step.target, group)]
         if _overlap(steps):
             return
         for seen in self.seen[group.name]:
+            if seen.at > plan.length:
+                return
             if seen.at < SETTLED_S:
+                if seen.code not in _QUIET | _AT_FIRST:
+                    yield f"{seen.at:.2f} s: {group.name}: {seen.code}: {seen.text}\n    is said at once"
+                    return
                 continue
+            yield from self._of_another_time(group, seen)
             near = [step for step in steps if step.at - 1 <= seen.at <= step.at + step.seconds + HEALED_S]
             allowed = self._allowed(group, near, seen.at)
             what = f"{seen.at:.2f} s: {group.name}: {seen.code}: {seen.text}"
@@ -257,6 +351,18 @@ class Promises:
                 ):
                     yield f"{what}\n    is about {sorted(seen.about)} and not {step.target}"
                     return
+
+    def _of_another_time(self, group: Group, seen: Seen) -> Iterator[str]:
+        """Yield what blames somebody who has just come, or who was away and has come back."""
+        for topic in seen.about if seen.code in ("silent", "no_publisher") else ():
+            driver = self.world.drivers[topic]
+            here = next((seen.at - begin for begin, end in driver.lives if begin <= seen.at <= end), 0.0)
+            died = driver.died is not None and driver.died <= seen.at <= driver.died + 30
+            what = f"{seen.at:.2f} s: {group.name}: {seen.code}: {seen.text}"
+            if seen.code == "silent" and 0 < here < _ABOUT_TO_SEND_S and not died:
+                yield f"{what}\n    but it has just come"
+            if seen.code == "no_publisher" and "until " not in seen.text and here > _HERE_S and driver.type == TYPE:
+                yield f"{what}\n    but it has been there for {here:.1f} s"
 
     def _allowed(self, group: Group, near: list[Step], at: float) -> frozenset[str]:
         """Return what may be found first, a while before a fault is named and after it has ended too."""

@@ -4,6 +4,7 @@ import json
 import struct
 from collections.abc import Callable, Sequence
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 OTHER_TYPE: Final = "geometry_msgs/msg/PointStamped"
 _TICK: Final = 50 * MS
+# Calls after which a relay that is paused or inactive is so still.
+_SENDS_NOTHING_NEW: Final = frozenset({"status", "reload", "pause", "deactivate"})
 # Moments begin here, some time before the world does.
 _FIRST: Final = 900 * SECOND
 
@@ -65,9 +68,13 @@ class Driver:
         self._life = 0
         self._number = 0
         self.writer: Writer | None = None
+        self.lives: list[tuple[float, float]] = []
+        """When it was there with messages of the usual type, in seconds since the world began."""
+        self.died: float | None = None
 
     def start(self) -> None:
         """Join, and publish from the next moment on."""
+        self.leave()
         self._life += 1
         process = Process(self.world.scheduler, f"driver of {self.sensor.topic}")
         process.clock_offset = self.world.clock_offset
@@ -78,6 +85,7 @@ class Driver:
         profile = Profile(depth=sensor.depth, reliability=self.reliability, durability=sensor.durability)
         self.writer = node.writer(sensor.topic, self.type, profile)
         now = self.world.scheduler.now
+        self.lives.append((self.world.now, inf))
         self._number = max(self._number, (now - _FIRST) // self.period + 1)
         self._plan_next(self._life)
 
@@ -85,12 +93,18 @@ class Driver:
         """Leave in order."""
         if self.writer is not None:
             self.writer = None
+            self._end_life()
             self.participant.leave()
+
+    def _end_life(self) -> None:
+        self.lives[-1] = self.lives[-1][0], self.world.now
 
     def die(self) -> None:
         """Die, as by SIGKILL."""
         if self.writer is not None:
             self.writer = None
+            self.died = self.world.now
+            self._end_life()
             self.participant.kill()
 
     def _plan_next(self, life: int) -> None:
@@ -109,6 +123,7 @@ class Driver:
         self._plan_next(life)
         if self.is_silent or (self.is_halved and number % 2):
             return
+        # What is under way as the rig's clock jumps was sampled before.
         stamp = self.world.stamp_at(at)
         if self.sensor.wobble:
             stamp += int(self.sensor.wobble * self.random.random())
@@ -119,6 +134,8 @@ class Driver:
         if self.dies_in_write:
             self.dies_in_write = False
             writer, self.writer = self.writer, None
+            self.died = self.world.now
+            self._end_life()
             writer.write(data, dies=True)
             return
         self.world.heard_write(self.sensor.topic, number)
@@ -140,8 +157,11 @@ class Witness:
     def __init__(self, world: "World", topics: Sequence[str]) -> None:
         self.world, self.topics = world, topics
         self.readers: list[Reader] = []
+        self.away_since: float | None = 0.0
 
     def start(self) -> None:
+        self.leave()
+        self.away_since = None
         process = Process(self.world.scheduler, "witness")
         self.participant = self.world.bus.participant(process)
         node = self.participant.node("witness")
@@ -153,6 +173,7 @@ class Witness:
     def leave(self) -> None:
         if self.readers:
             self.readers = []
+            self.away_since = self.world.now
             self.participant.leave()
 
 
@@ -233,8 +254,10 @@ class World:
         self.scheduler = Scheduler(plan.seed, eagerness=plan.eagerness, lag_ns=round(plan.lag_ms * MS))
         self.began = self.scheduler.now
         self.clock_offset = self.scheduler.process.clock_offset
-        self.sim_offset = -self.began
+        self._rig_clock = [(0, -self.began if plan.by_sim_time else self.clock_offset)]
         self.sim_stopped: int | None = None
+        self.still_since: float | None = None
+        """Since when the relay must send nothing: it has said that it is paused, or deactivated."""
         self.random: Random = self.scheduler.stream("world")
         weather = Weather(
             discovery=round(plan.discovery_ms * MS), latency=round(plan.latency_ms * MS), missed=plan.missed
@@ -249,6 +272,8 @@ class World:
         """Why DDS makes nothing on the outputs."""
         self.refused_everywhere: str | None = None
         """Why it makes nothing at all."""
+        self.refused_output: str | None = None
+        """The one output on which it makes nothing."""
         self.path = folder / "fusion.yaml"
         self.absent: set[str] = set()
         self.is_to_be_active = False
@@ -264,6 +289,8 @@ class World:
 
     def refused(self, topic: str) -> str | None:
         """Return why DDS makes nothing on a topic for the relay."""
+        if topic == self.refused_output:
+            return "no memory"
         return self.refused_everywhere or (self.refusal if topic in self.outputs else None)
 
     @property
@@ -273,9 +300,23 @@ class World:
 
     def stamp_at(self, when: int) -> int:
         """What the rig's clock shows at a monotonic time."""
-        if not self.plan.by_sim_time:
-            return when + self.clock_offset
-        return (when if self.sim_stopped is None else min(when, self.sim_stopped)) + self.sim_offset
+        if self.sim_stopped is not None:
+            when = min(when, self.sim_stopped)
+        return when + next(offset for since, offset in reversed(self._rig_clock) if since <= when)
+
+    def shift_rig_clock(self, by: int) -> None:
+        """Set the clock that stamps all messages."""
+        self._rig_clock.append((self.scheduler.now, self._rig_clock[-1][1] + by))
+
+    def stop_rig_clock(self) -> None:
+        """Have it rest."""
+        self.sim_stopped = self.scheduler.now
+
+    def go_on_with_rig_clock(self) -> None:
+        """Have it go on where it rested."""
+        if self.sim_stopped is not None:
+            self.shift_rig_clock(self.sim_stopped - self.scheduler.now)
+            self.sim_stopped = None
 
     def write_file(self, text: str | None = None) -> None:
         """Write the relay's file as it is to be now, or a text."""
@@ -324,6 +365,8 @@ class World:
         """Call a service of the relay."""
         node = self.relay.node if self.relay is not None else None
         if node is not None:
+            if service == "resume":
+                self.still_since = None
             asked = len(self.answers)
             self.answers.append((self.now, service, None))
             node.request(service, lambda answer: self._answered(asked, answer))
@@ -332,6 +375,8 @@ class World:
         """Ask the relay's node for a transition."""
         node = self.relay.node if self.relay is not None else None
         if node is not None:
+            if name == "activate":
+                self.still_since = None
             asked = len(self.answers)
             self.answers.append((self.now, name, None))
             node.transition(name, lambda success: self._answered(asked, success))
@@ -351,6 +396,9 @@ class World:
     def _answered(self, asked: int, answer: Any) -> None:
         at, name, _ = self.answers[asked]
         self.answers[asked] = at, name, answer
+        is_last = all(other in _SENDS_NOTHING_NEW for _, other, _ in self.answers[asked + 1 :])
+        if (name == "pause" or (name == "deactivate" and answer is True)) and is_last:
+            self.still_since = self.now
 
     def reload(self) -> None:
         """Have the relay read its file again, in one of the ways that there are."""
@@ -364,5 +412,7 @@ class World:
     def set_clock(self, by: int) -> None:
         """Set this machine's clock."""
         self.clock_offset += by
+        if not self.plan.by_sim_time:
+            self.shift_rig_clock(by)
         for participant in self.bus.participants:
             participant.process.clock_offset += by
