@@ -9,21 +9,17 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
-from syncrelay.config import load
 from syncrelay.config.profile import Profile
-from syncrelay.config.rereading import ConfigFiles
+from syncrelay.explain.facts import InputFacts
 from syncrelay.explain.judge import explanation
-from syncrelay.relay.ports import EndpointInfo, Graph, Node, Outcome
+from syncrelay.relay.ports import EndpointInfo
 from syncrelay.relay.relay import Relay
-from syncrelay.relay.running import run, services
-from syncrelay.relay.transitions import Transitions
-from syncrelay.runtime import Runtime
-from syncrelay.status import status_of
-from syncrelay.top.plain import summary
 from tests.conformance.script import VECTOR, Script
+from tests.conformance.world import Reader, World, Writer
 from tests.ros.cdr_messages import vector
+from tests.simulated.running import Running
 
 _LOG: Final = logging.getLogger("syncrelay")
 _MS: Final = 1_000_000
@@ -33,90 +29,6 @@ _BY_CHANCE: Final = re.compile("not known yet|no (more )?sets? for ")
 _PLACE: Final = re.compile(r", at [^ ,]+:\d+")
 # With its unit, which goes by the size of a duration.
 _NUMBER: Final = re.compile(r"\d+(\.\d+)?( (ns|us|ms|s)\b)?")
-
-
-class Writer(Protocol):
-    """A publisher of bytes."""
-
-    @property
-    def n_readers(self) -> int:
-        """How many subscribers it serves."""
-        ...
-
-    def write(self, content: bytes) -> None:
-        """Publish."""
-        ...
-
-    def end(self) -> None:
-        """End it, in order."""
-        ...
-
-
-class Reader(Protocol):
-    """A subscriber, which keeps what its history holds until that is taken."""
-
-    @property
-    def n_writers(self) -> int:
-        """How many publishers serve it, as it knows."""
-        ...
-
-    def take(self) -> bytes | None:
-        """Take the oldest message."""
-        ...
-
-    def end(self) -> None:
-        """End it, in order."""
-        ...
-
-
-class World(Protocol):
-    """A ROS. `by` names a process: who shares one shares a participant."""
-
-    @property
-    def runtime(self) -> Runtime:
-        """The clocks and threads of the relay's process."""
-        ...
-
-    @property
-    def graph(self) -> Graph:
-        """The graph, as somebody sees it who has nothing else to do."""
-        ...
-
-    def writer(self, topic: str, type_name: str, profile: Profile, *, by: str, node: str) -> Writer:
-        """Make a publisher."""
-        ...
-
-    def reader(self, topic: str, type_name: str, profile: Profile, *, by: str, node: str) -> Reader:
-        """Make a subscriber."""
-        ...
-
-    def leave(self, by: str) -> None:
-        """Have a process end in order."""
-        ...
-
-    def kill(self, by: str) -> None:
-        """Have a process end by SIGKILL."""
-        ...
-
-    def join(self, config: Any, names: Mapping[str, str]) -> tuple[Any, Any]:
-        """Have the relay's node join, with these remaps; the node and its backend."""
-        ...
-
-    def hold(self, node: Any, topic: str, type_name: str) -> None:
-        """Have the relay's own process publish on a topic."""
-        ...
-
-    def wait_until(self, condition: Callable[[], object], what: str) -> None:
-        """Go on once something holds; raises where it never does."""
-        ...
-
-    def call(self, node: Node, service: str) -> tuple[bool, str]:
-        """Call a service below the relay's name."""
-        ...
-
-    def transition(self, node: Node, name: str) -> tuple[bool, str]:
-        """Ask the relay's node for a transition; whether that succeeded, and its state."""
-        ...
 
 
 @dataclass
@@ -131,57 +43,17 @@ class Seen:
     """The warnings and errors of the relay."""
 
 
-class _Running:
-    """The relay and its main thread, as `syncrelay --config` has it."""
+class _Running(Running):
+    """The relay, on a thread that keeps what it raises for the test."""
 
-    def __init__(self, world: World, path: Path, names: Mapping[str, str]) -> None:
-        self.world, self.path, self.names = world, path, names
-        self.requested = self.has_ended = self._wants_reload = False
-        self.relay: Relay | None = None
-        self.error: BaseException | None = None
-
-    def take_reload(self) -> bool:
-        wanted, self._wants_reload = self._wants_reload, False
-        return wanted
-
-    def hang_up(self) -> None:
-        self._wants_reload = True
-        if self.relay is not None:
-            self.relay.wake()
-
-    def end(self) -> None:
-        self.requested = True
-        if self.relay is not None:
-            self.relay.wake()
+    error: BaseException | None = None
 
     def main(self) -> None:
         try:
-            self._main()
+            super().main()
         except Exception as error:  # noqa: BLE001  raised where the test waits
             self.error = error
         self.has_ended = True
-
-    def _main(self) -> None:
-        runtime, paths = self.world.runtime, [str(self.path)]
-        files = ConfigFiles(paths, watched=False, runtime=runtime)
-        config = load(*paths)
-        node, backend = self.world.join(config, self.names)
-
-        def managed(relay: Relay) -> Callable[[str], Outcome]:
-            is_stopped = lambda: self.requested  # noqa: E731
-            return Transitions(relay, paths=paths, require=_anything, is_stopped=is_stopped, runtime=runtime).carry_out
-
-        manage = managed if config.node.lifecycle else None
-        with Relay(config, node, backend, config_paths=paths, manage=manage, runtime=runtime) as relay, files:
-            files.call_when_read(relay.wake)
-            relay.offer(services(relay, files, lambda: summary(status_of(relay.state())), runtime=runtime))
-            self.relay = relay
-            run(relay, files, self, require=_anything)
-            relay.drain()
-
-
-def _anything(_: object) -> None:
-    """Any file will do."""
 
 
 class _Recorder(logging.Handler):
@@ -245,7 +117,10 @@ class Player:
         self._path = self._folder / "fusion.yaml"
         self._node_keys = node or {}
         self.file(groups)
-        self._running = running = _Running(self._world, self._path, names or {})
+        world = self._world
+        self._running = running = _Running(
+            self._path, join=lambda config: world.join(config, names or {}), runtime=world.runtime
+        )
         self._world.runtime.start("relay", running.main)
         self._until(lambda: running.relay is not None or running.error, "the relay")
 
@@ -366,7 +241,7 @@ class Player:
         noted: list[Any] = []
 
         def is_so() -> bool:
-            inputs = next((each.facts.inputs for each in self._reports() if each.facts.name == name), ())
+            inputs = self._inputs(name)
             noted[:] = [
                 (each.name, each.counts.fed, each.counts.matched, each.counts.buffered, _by_reason(each.counts.dropped))
                 for each in inputs
@@ -380,8 +255,7 @@ class Player:
         """So many messages of a group were dropped for a reason."""
 
         def is_so() -> bool:
-            inputs = next((each.facts.inputs for each in self._reports() if each.facts.name == name), ())
-            return sum(_by_reason(each.counts.dropped).get(reason, 0) for each in inputs) >= count
+            return sum(_by_reason(each.counts.dropped).get(reason, 0) for each in self._inputs(name)) >= count
 
         self._until(is_so, f"{count} dropped as {reason}")
 
@@ -493,6 +367,9 @@ class Player:
 
     def _reports(self) -> Any:
         return self._relay.call(self._relay.evaluate).result()
+
+    def _inputs(self, group: str) -> Sequence[InputFacts]:
+        return next((each.facts.inputs for each in self._reports() if each.facts.name == group), ())
 
     def _fed(self, name: str) -> int:
         topic = self._writers[name][1]

@@ -8,15 +8,12 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from syncrelay.config import Config, load
+from syncrelay.config import Config
 from syncrelay.config.profile import Profile
-from syncrelay.config.rereading import ConfigFiles
-from syncrelay.relay.relay import Relay
-from syncrelay.relay.running import run, services
-from syncrelay.relay.transitions import Transitions
 from tests.simulated.bus import Bus, Reader, Weather, Writer
 from tests.simulated.node import CLOCK_TYPE, SimulatedBackend, SimulatedNode
 from tests.simulated.plan import TYPE, Plan, Sensor
+from tests.simulated.running import Running
 from tests.simulated.scheduler import MS, SECOND, Process, Scheduler, SimulatedRuntime
 
 if TYPE_CHECKING:
@@ -177,73 +174,28 @@ class Witness:
             self.participant.leave()
 
 
-class RelayProcess:
-    """The relay, with what `syncrelay --config` does around it."""
+class RelayProcess(Running):
+    """The relay, in a process of its own."""
 
     def __init__(self, world: "World", path: Path) -> None:
-        self.world, self.path = world, path
         self.process = Process(world.scheduler, "relay")
         self.process.clock_offset = world.clock_offset
-        self.runtime = SimulatedRuntime(self.process)
-        self.relay: Relay | None = None
         self.node: SimulatedNode | None = None
-        self.requested = False
-        self.has_ended = False
-        self._wants_reload = False
-        world.scheduler.start("main", self._main, self.process)
-
-    def take_reload(self) -> bool:
-        wanted, self._wants_reload = self._wants_reload, False
-        return wanted
-
-    def hang_up(self) -> None:
-        """Send SIGHUP."""
-        self._wants_reload = True
-        if self.relay is not None:
-            self.relay.wake()
-
-    def end(self) -> None:
-        """Send SIGTERM."""
-        self.requested = True
-        if self.relay is not None:
-            self.relay.wake()
-
-    def _main(self) -> None:
-        runtime, plan = self.runtime, self.world.plan
-        files = ConfigFiles([str(self.path)], watched=plan.watched, runtime=runtime)
-        config = load(str(self.path))
-        self.node = node = SimulatedNode(
-            self.world.bus.participant(self.process), runtime, is_simulated=config.node.use_sim_time
+        self._world, self._simulated = world, SimulatedRuntime(self.process)
+        super().__init__(
+            path,
+            join=self._joined,
+            runtime=self._simulated,
+            watched=world.plan.watched,
+            drained=lambda: world.drained(),  # noqa: PLW0108  it may be another then
         )
-        node.refusal = self.world.refused
+        world.scheduler.start("main", self.main, self.process)
 
-        def managed(relay: Relay) -> Callable[[str], Any]:
-            return Transitions(
-                relay, paths=[str(self.path)], require=_anything, is_stopped=lambda: self.requested, runtime=runtime
-            ).carry_out
-
-        with (
-            Relay(
-                config,
-                node,
-                SimulatedBackend(runtime),
-                config_paths=[str(self.path)],
-                manage=managed if config.node.lifecycle else None,
-                runtime=runtime,
-            ) as relay,
-            files,
-        ):
-            files.call_when_read(relay.wake)
-            relay.offer(services(relay, files, lambda: "it stands", runtime=runtime))
-            self.relay = relay
-            run(relay, files, self, require=_anything)
-            relay.drain()
-            self.world.drained()
-        self.has_ended = True
-
-
-def _anything(_: Config) -> None:
-    """Any file will do."""
+    def _joined(self, config: Config) -> tuple[SimulatedNode, SimulatedBackend]:
+        participant = self._world.bus.participant(self.process)
+        self.node = SimulatedNode(participant, self._simulated, is_simulated=config.node.use_sim_time)
+        self.node.refusal = self._world.refused
+        return self.node, SimulatedBackend(self._simulated)
 
 
 class World:
