@@ -15,9 +15,7 @@ _ENVIRON = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONSAFEPATH": "1"}
 @pytest.mark.parametrize(
     "words",
     [
-        ["replay", "bag.mcap", "--config", "pipe"],
         ["export", "bag.mcap", "--config", "pipe", "-o", "out"],
-        ["analyze", "bag.mcap", "--config", "pipe"],
         ["test", "pipe"],
     ],
     ids=lambda words: words[0],

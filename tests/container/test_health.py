@@ -8,8 +8,7 @@ import time
 import pytest
 
 from tests.container.docker import HARDENED, PROBED_EVERY_SECOND, docker
-from tests.container.stages import CONFIG, assert_relayed
-from tests.ros.processes import wait_until
+from tests.container.stages import CONFIG
 
 pytestmark = pytest.mark.container
 
@@ -49,16 +48,6 @@ def test_the_command_says_the_same_as_the_probe(relays):
     relay = relays.run(CONFIG, "--network=host", *PROBED_EVERY_SECOND)
     relay.wait_for_health("healthy")
     assert docker("exec", relay.id, "syncrelay", "healthcheck") == "receiving"
-
-
-@pytest.mark.parametrize("below", [(), ("--init",)], ids=["as PID 1", "below an init"])
-def test_a_relay_that_crashed_is_started_again_and_relays(relays, host, below):
-    relay = relays.run(CONFIG, "--network=host", "--restart=unless-stopped", *below, *HARDENED, *PROBED_EVERY_SECOND)
-    relay.wait_for_health("healthy")
-    os.kill(relay.relay_pid(), signal.SIGKILL)
-    wait_until(lambda: relay.inspect()["RestartCount"] == 1 and relay.running(), "the relay to be started again")
-    relay.wait_for_health("healthy")
-    assert_relayed(host)
 
 
 @pytest.mark.parametrize("below", [(), ("--init",)], ids=["as PID 1", "below an init"])

@@ -9,7 +9,6 @@ import pytest
 
 from syncrelay.ros.compiled import source_fingerprint
 from tests.container.docker import IMAGE, docker, run_docker
-from tests.ros.configs import config, inputs
 
 pytestmark = pytest.mark.container
 
@@ -61,13 +60,6 @@ def in_image(tmp_path: Path):
         return run_docker("run", "--rm", "--network=none", f"--volume={tmp_path}:/config:ro", *options, IMAGE, *words)
 
     return run
-
-
-def test_a_sound_file_is_valid_in_the_container(in_image, tmp_path):
-    topics = inputs({"/camera": "sensor_msgs/msg/Image", "/lidar": "sensor_msgs/msg/PointCloud2"})
-    (tmp_path / "fusion.yaml").write_text(config({"front": {"policy": "exact_time", "topics": topics}}))
-    run = in_image("validate", "/config/fusion.yaml")
-    assert (run.returncode, run.stdout) == (0, "/config/fusion.yaml: ok, 1 group, 2 topics\n")
 
 
 def test_a_faulty_file_is_explained_in_the_container_with_the_types_that_it_has(in_image, tmp_path):

@@ -20,10 +20,6 @@ APPROXIMATE = {"policy": "approximate_time", "slop": "20ms"}
 # As long as a test may last: what plays on and on ends with its test, however slow the machine.
 ON_AND_ON_MS = 300_000
 
-# Nodes that begin at different times play together all the same.
-BY_RECEIPT = inputs(PAIR, stamp="receive")
-
-
 # Findings that are true of a rig on a busy machine, which no test can prevent.
 OF_A_BUSY_MACHINE = {"too_slow", "bursts", "slowed", "silent"}
 

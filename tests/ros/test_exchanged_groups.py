@@ -12,7 +12,7 @@ import pytest
 from syncrelay.config import Config, StampField, load_text
 from syncrelay.config.reload import Subscription, exchange
 from syncrelay.errors import ReloadError
-from syncrelay.explain import Endpoint, Refusal
+from syncrelay.explain import Refusal
 from syncrelay.relay.ports import Purpose
 from syncrelay.runtime import SYSTEM
 from tests.faults.extent import chosen
@@ -235,24 +235,3 @@ def test_any_groups_take_the_place_of_any_others_or_leave_them_as_they_were(here
             now = _subscriptions(here, file)
             assert all(now[key] is each for key, each in subscribed.items() if key in now)
     assert refused
-
-
-def test_a_type_that_was_taken_stays_when_the_node_is_activated(here):
-    untyped = {"policy": "exact_time", "topics": [{"topic": name} for name in ("/x", "/y")]}
-
-    def run() -> None:
-        here.bindings.run([GroupRelay(each, now=lambda: 0) for each in load_text(config({"f": untyped})).groups])
-
-    publisher = Endpoint("/driver", _IMU)
-    here.bindings.is_held = True
-    run()
-    here.bindings.topics[0].keep_type(publisher)
-    for _ in range(2):
-        here.bindings.release()
-        run()
-        assert [each.type_from for each in here.bindings.topics] == [publisher, None]
-        here.bindings.hold()
-    # What is forgotten is found anew.
-    here.bindings.run(())
-    run()
-    assert [each.type_from for each in here.bindings.topics] == [None, None]

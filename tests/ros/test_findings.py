@@ -7,36 +7,13 @@ from typing import Any
 import pytest
 
 from tests.ros.cdr_messages import VECTOR, serialize
-from tests.ros.configs import config, inputs
 from tests.ros.processes import wait_until
-from tests.ros.sensors import APPROXIMATE, front, play, stream
+from tests.ros.sensors import front, play, stream
 from tests.ros.stage import Stage
-from tests.ros.status import ANY_PORT, findings, get, page, status
+from tests.ros.status import findings, get, page, status
 from tests.ros.streams import merged
 
 pytestmark = pytest.mark.ros
-
-
-def test_sensors_of_one_node_that_fall_silent_are_one_line_over_all_groups(stage: Stage):
-    hub = ("/imu", "/gps", "/odom")
-    # Whoever starts 10 s after the other still finds its partners.
-    options = {**APPROXIMATE, "queue_size": 100}
-    groups = {
-        f"with{topic.replace('/', '_')}": {**options, "topics": inputs(dict.fromkeys(("/lidar", topic), VECTOR))}
-        for topic in hub
-    }
-    relay = stage.relay(config(groups, metrics=ANY_PORT))
-    play(stage, stream("/lidar", hz=10), node="ouster")
-    stopped = play(stage, merged(*(stream(topic, hz=10) for topic in hub)), node="hub")
-    wait_until(lambda: sum(each["rate_hz"] > 5 for each in status(relay)["groups"]) == len(hub), "sets of all groups")
-    stopped.process.send(signal.SIGSTOP)
-    relay.wait_for_log(r"no more sets for ")
-    lines = [line for line in relay.stderr.splitlines() if "no more sets for " in line]
-    stopped.process.send(signal.SIGCONT)
-    assert len(lines) == 1
-    assert "3 groups (with_imu, with_gps and with_odom): " in lines[0]
-    assert all(topic in lines[0] for topic in (*hub, "/hub")), lines
-    relay.wait_for_log("3 groups (with_imu, with_gps and with_odom): recovered after ")
 
 
 def test_messages_that_dds_lost_while_the_relay_stood_still_are_counted_and_the_relay_is_blamed(stage: Stage):

@@ -90,6 +90,7 @@ def test_whatever_is_asked_for_the_state_is_the_one_that_the_transitions_lead_to
     relay, manager = stage.relay(_managed({"use_sim_time": True})), _Manager(stage)
     told = stage.collector({"/diagnostics": "diagnostic_msgs/msg/DiagnosticArray"})
     wait_until(lambda: any(b"is unconfigured" in each for each in told.payloads("/diagnostics")), "it on /diagnostics")
+    manager.watch()
     state = "unconfigured"
     for _ in range(20):
         likely = [transition for before, transition in _LEADS_TO if before == state]
@@ -112,6 +113,7 @@ def test_whatever_is_asked_for_the_state_is_the_one_that_the_transitions_lead_to
     summaries = relay.stderr.count("front: 0 sets")
     assert manager.change("shutdown")
     assert manager.state == "finalized"
+    wait_until(lambda: manager.goals()[-1:] == ["finalized"], "the event that tells it")
     # It was deactivated first.
     assert relay.stderr.count("front: 0 sets") == summaries + 1
     assert not manager.change("configure")
