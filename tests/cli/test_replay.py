@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from tests.cli.command import run, run_here, run_python
+from tests.cli.command import run, run_here
 from tests.cli.terminals import on_terminal
 from tests.recordings.bag.making import rig, write_mcap, write_ros1
 from tests.ros.cdr_messages import VECTOR
@@ -130,23 +130,6 @@ def test_a_fault_changes_what_comes_and_is_named(replayed):
         "syncrelay: faults laid over the recording (seed 0): `dead: /lidar from 2s`, `offset: /lidar 5ms`",
         "syncrelay: front: 20 sets with the faults, 40 without",
     ]
-
-
-def test_a_fault_that_changes_nothing_is_told(replayed):
-    sets, _, said = replayed("--what-if", "dead: /lidar from 30s")
-    why = "the first message of /lidar came after 0 s, the last after 3.9 s"
-    assert (sets, said[1]) == ("front: 40 sets", f"syncrelay: `dead: /lidar from 30s` changed nothing: {why}")
-
-
-def test_a_seed_decides_what_is_lost(replayed):
-    lost = ("--what-if", "drop: /lidar 50%", "--json", "--seed")
-    assert replayed(*lost, "1") == replayed(*lost, "1") != replayed(*lost, "2")
-
-
-def test_it_needs_no_ros(folder):
-    script = "import sys; sys.modules['rclpy'] = None; from syncrelay.cli import main; sys.exit(main(sys.argv[1:]))"
-    done = run_python("-c", script, "replay", "rig.mcap", "--config", "f.yaml", folder=folder)
-    assert (done.returncode, done.stdout) == (0, _SUMMARY)
 
 
 def test_a_terminal_gets_a_bar_on_stderr_that_leaves_no_trace_on_stdout(folder):

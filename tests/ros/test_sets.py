@@ -25,10 +25,9 @@ from tests.ros.cdr_messages import (
     with_stamp,
 )
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs, outputs
-from tests.ros.domain import claimed_domain
 from tests.ros.frames import Frame
 from tests.ros.processes import Process, wait_until
-from tests.ros.stage import BACKENDS, Collector, Player, Stage, both_backends, running_stage
+from tests.ros.stage import Collector, Player, Stage, both_backends
 from tests.ros.streams import BEGIN, MS, jittery, merged
 from tests.ros.summary import read_summary
 
@@ -138,14 +137,6 @@ def _sets_of_engine(group: GroupConfig) -> list[tuple[bytes, ...]]:
     return sets[1:]
 
 
-class _Run(NamedTuple):
-    came: dict[str, list[bytes]]
-    """What came out of each output, but for what opens the run."""
-    subscriptions: list[int]
-    """How many each topic has, and that of a group that was not named."""
-    log: str
-
-
 def _came(collector: Collector, output: str, *, since: int = BEGIN - _APART // 2) -> list[bytes]:
     begin = since + _TOPICS[_OUTPUTS[output]].shift
     return [padded(payload) for payload in collector.payloads(output) if stamp_of(payload) >= begin]
@@ -164,49 +155,40 @@ def _hold_up(relay: Process, player: Player, collector: Collector) -> None:
         )
 
 
-@pytest.fixture(scope="module", params=BACKENDS)
-def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> _Run:
+@both_backends
+def test_the_sets_that_leave_are_those_of_the_engine_and_all_is_accounted_for(stage: Stage):
     """A recording that begins again twice, at last for a relay that is held up; it started after its publishers."""
-    with claimed_domain() as domain, running_stage(tmp_path_factory.mktemp("sets"), domain, request.param) as stage:
-        collector = stage.collector({output: _TOPICS[topic].type_name for output, topic in _OUTPUTS.items()})
-        player = stage.player(relaying.topics_of(_RECORDING))
-        wait_until(lambda: all(collector.endpoints(topic, kind="publisher") for topic in _TOPICS), "the publishers")
-        relay = stage.relay(_TEXT, *(word for name in (*GROUPS, "short") for word in ("--group", name)))
-        relaying.play_until_out(player, collector, map(_a_set, itertools.count(BEGIN - _APART, MS)), _OUTPUTS)
-        for nth in range(1, _PASSES + 1):
-            # Paced: of what DDS has to send again the order between topics is another.
-            player.start(_RECORDING, speed=1 if nth == _PASSES else 4)
-            if nth == _PASSES:
-                _hold_up(relay, player, collector)
-            player.finish()
-            player.play(_a_set(_CLOSING))
-            collector.process.wait_until(
-                lambda nth=nth: all(len(_came(collector, each, since=_CLOSING)) == nth for each in _OUTPUTS),
-                "the sets that close the recording",
-            )
-        subscriptions = [len(collector.endpoints(topic, kind="subscription")) for topic in (*_TOPICS, "/absent")]
-        relay.send(signal.SIGTERM)
-        assert relay.wait() == 0
-        return _Run({output: _came(collector, output) for output in _OUTPUTS}, subscriptions, relay.stderr)
-
-
-@pytest.mark.parametrize("name", GROUPS)
-def test_the_sets_that_leave_are_those_of_the_engine(run: _Run, name: str):
-    (group,) = (each for each in load_text(_TEXT).groups if each.name == name)
-    expected = _sets_of_engine(group)
-    assert len(expected) > 30
-    assert [*zip(*(run.came[topic.output] for topic in group.topics), strict=True)] == expected
-
-
-def test_a_topic_is_subscribed_once_for_all_groups_and_a_group_that_is_not_named_does_not_run(run: _Run):
-    assert run.subscriptions == [1] * len(_TOPICS) + [0]
-    assert set(read_summary(run.log)) == {*GROUPS, "short"}
-
-
-def test_what_has_no_readable_stamp_is_counted_and_a_queue_too_short_is_told(run: _Run):
-    summary = read_summary(run.log)
+    collector = stage.collector({output: _TOPICS[topic].type_name for output, topic in _OUTPUTS.items()})
+    player = stage.player(relaying.topics_of(_RECORDING))
+    wait_until(lambda: all(collector.endpoints(topic, kind="publisher") for topic in _TOPICS), "the publishers")
+    relay = stage.relay(_TEXT, *(word for name in (*GROUPS, "short") for word in ("--group", name)))
+    relaying.play_until_out(player, collector, map(_a_set, itertools.count(BEGIN - _APART, MS)), _OUTPUTS)
+    for nth in range(1, _PASSES + 1):
+        # Paced: of what DDS has to send again the order between topics is another.
+        player.start(_RECORDING, speed=1 if nth == _PASSES else 4)
+        if nth == _PASSES:
+            _hold_up(relay, player, collector)
+        player.finish()
+        player.play(_a_set(_CLOSING))
+        collector.process.wait_until(
+            lambda nth=nth: all(len(_came(collector, each, since=_CLOSING)) == nth for each in _OUTPUTS),
+            "the sets that close the recording",
+        )
+    subscriptions = [len(collector.endpoints(topic, kind="subscription")) for topic in (*_TOPICS, "/absent")]
+    relay.send(signal.SIGTERM)
+    assert relay.wait() == 0
+    for group in load_text(_TEXT).groups:
+        if group.name in GROUPS:
+            expected = _sets_of_engine(group)
+            assert len(expected) > 30
+            came = (_came(collector, topic.output) for topic in group.topics)
+            assert [*zip(*came, strict=True)] == expected, group.name
+    # A topic is subscribed once for all groups, and a group that is not named does not run.
+    assert subscriptions == [1] * len(_TOPICS) + [0]
+    summary = read_summary(relay.stderr)
+    assert set(summary) == {*GROUPS, "short"}
     assert summary["as_it_came"].inputs["/lidar"].dropped == {"malformed": 3 * _PASSES, "unstamped": _PASSES}
-    told = [line for line in run.log.splitlines() if "some left the full queue before their partners came" in line]
+    told = [line for line in relay.stderr.splitlines() if "some left the full queue before their partners came" in line]
     assert len(told) == 1
     assert re.search(r"short:   /imu: .*overflow \d+", told[0])
 
