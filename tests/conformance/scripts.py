@@ -321,7 +321,7 @@ _CLOCKS: Final = (
         do.write("/clock", 0, data=b"\0\1\0\0\xff\xff\xff\xff\0\0\0\0"), do.sleep(0.2), do.clock(2.0), do.sets(10),
         _out(1)),
     long("ticks of this machine's time make sets",
-        _rig(**_TICKS), do.sets(10), _out(3), blind=("outputs", "notes")),
+        _SENSORS, do.relay(_front(**_TICKS)), _EARS, do.ready(), do.sets(10), _out(3), blind=("outputs", "notes")),
     long("ticks of simulated time make sets",
         _CLOCK, _SENSORS, do.relay(_front(**_TICKS), node=_SIM), _EARS, do.ready(), do.served("/clock", 1),
         do.clock(100.0), do.absolute("/a", 99_990_000_000), do.absolute("/b", 99_980_000_000), do.fed("/a", 1),
