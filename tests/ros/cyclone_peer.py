@@ -5,10 +5,8 @@ a line of JSON on stdout when it is done:
 
     {"do": "write", "topic": T, "type": N, "qos": Q}    there is a writer of ROS's topic T, of ROS's type N
     {"do": "read", "topic": T, "type": N, "qos": Q}     there is a reader
-    {"do": "end", "topics": [T]}                        there are none any more
     {"do": "matched"}                                   how many readers each writer has, how many writers each reader
     {"do": "play", "file": F, "speed": S}               the frames of F were published, paced by their times
-    {"do": "begin", "file": F, "speed": S}              they are being published, until `play`, `begin` or the end
 
 Q has the keys of a `qos` in a file, with durations in nanoseconds. It ends when stdin does.
 """
@@ -122,30 +120,16 @@ class Peer:
     """The types of the topics."""
     lock: threading.Lock = field(default_factory=threading.Lock)
     ended: threading.Event = field(default_factory=threading.Event)
-    player: threading.Thread | None = None
-    stopped: threading.Event = field(default_factory=threading.Event)
 
     def answer(self, asked: dict[str, Any]) -> object:
         match asked["do"]:
             case "write" | "read" as side:
                 self._open(side, asked["topic"], asked["type"], qos_of(asked["qos"]))
-            case "end":
-                with self.lock:
-                    for topic in asked["topics"]:
-                        self.writers.pop(topic, None)
-                        self.readers.pop(topic, None)
             case "matched":
                 readers = {topic: len(each.get_matched_subscriptions()) for topic, each in self.writers.items()}
                 return readers | {topic: len(each.get_matched_publications()) for topic, each in self.readers.items()}
             case "play":
-                self.stop()
                 self._play(frames.read(Path(asked["file"])), asked["speed"])
-            case "begin":
-                self.stop()
-                self.player = threading.Thread(
-                    target=self._play, args=(frames.read(Path(asked["file"])), asked["speed"])
-                )
-                self.player.start()
         return None
 
     def _open(self, side: str, name: str, type_name: str, qos: Qos) -> None:
@@ -161,17 +145,9 @@ class Peer:
         began = time.monotonic()
         for frame in recording:
             due = began + (frame.time - recording[0].time) / 1e9 / speed
-            if self.stopped.wait(max(0, due - time.monotonic())):
-                return
+            time.sleep(max(0, due - time.monotonic()))
             # Cyclone reads and writes it: what leaves here are its own bytes.
             self.writers[frame.topic].write(struct_of(frame.type_name).deserialize(frame.payload))
-
-    def stop(self) -> None:
-        if self.player is not None:
-            self.stopped.set()
-            self.player.join()
-            self.player = None
-        self.stopped.clear()
 
     def receive(self) -> None:
         while not self.ended.wait(_POLL_S):
@@ -195,7 +171,6 @@ def main() -> None:
         receiving.start()
         for line in sys.stdin:
             print(json.dumps(peer.answer(json.loads(line))), flush=True)  # noqa: T201  the answer
-        peer.stop()
         peer.ended.set()
         receiving.join()
 

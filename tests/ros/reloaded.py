@@ -35,13 +35,5 @@ class ReloadedFile:
         )
         assert self.count("reloads") == taken + 1, status(self.relay)["relay"]["reload_error"]
 
-    def refuse(self, text: str) -> str:
-        """Write a file that is to be refused; why it was."""
-        self.write(text)
-        before = self.count("refused_reloads")
-        self.relay.send(signal.SIGHUP)
-        wait_until(lambda: self.count("refused_reloads") == before + 1, "the file to be refused")
-        return str(status(self.relay)["relay"]["reload_error"])
-
     def count(self, what: str) -> int:
         return int(status(self.relay)["relay"][what])

@@ -1,15 +1,13 @@
 """What a user reads where ROS cannot be used, in environments that really lack it: links to this one's packages."""
 
-import importlib.util
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-_ROOT = Path(__file__).parents[2]
-_BASE = ["pydantic", "pydantic_core", "annotated_types", "typing_extensions", "typing_inspection", "yaml", "_yaml"]
+from tests.doctor.environments import OURS, ROOT, site_with
+
 _RCLPY = [
     "rclpy",
     "rpyutils",
@@ -18,7 +16,6 @@ _RCLPY = [
     "rcl_interfaces",
     "rosidl_parser",
     "rosidl_pycommon",
-    "numpy",
 ]
 
 _FILE = """\
@@ -37,20 +34,12 @@ def relay_with(tmp_path):
     """Run the relay where only the packages named are to be found, and give the finished process."""
 
     def run(packages, **environ):
-        site = tmp_path / "site"
-        site.mkdir()
-        for package in packages:
-            found = importlib.util.find_spec(package)
-            assert found is not None
-            assert found.origin is not None
-            origin = Path(found.origin)
-            origin = origin.parent if origin.name.startswith("__init__") else origin
-            (site / origin.name).symlink_to(origin)
+        site = site_with(tmp_path, packages)
         (tmp_path / "fusion.yaml").write_text(_FILE)
         # -S: without the environment's own site-packages, and without the wheels' start-up hook.
         return subprocess.run(
             [sys.executable, "-S", "-m", "syncrelay", "--config", tmp_path / "fusion.yaml"],
-            env={"PYTHONPATH": f"{_ROOT}:{site}", "PATH": os.environ["PATH"], **environ},
+            env={"PYTHONPATH": f"{ROOT}:{site}", "PATH": os.environ["PATH"], **environ},
             capture_output=True,
             text=True,
             timeout=120,
@@ -63,10 +52,10 @@ def relay_with(tmp_path):
 @pytest.mark.parametrize(
     ("packages", "environ", "said"),
     [
-        (_BASE, {}, ["rclpy is not installed", "pip install '.[ros]'", "source /opt/ros"]),
-        (_BASE, {"ROS_DISTRO": "jazzy"}, ["ROS 2 jazzy is sourced, but Python", "--system-site-packages"]),
+        (OURS, {}, ["rclpy is not installed", "pip install '.[ros]'", "source /opt/ros"]),
+        (OURS, {"ROS_DISTRO": "jazzy"}, ["ROS 2 jazzy is sourced, but Python", "--system-site-packages"]),
         pytest.param(
-            [*_BASE, *_RCLPY],
+            [*OURS, *_RCLPY],
             {},
             ["rclpy is installed but cannot be imported: lib", "middleware"],
             marks=pytest.mark.ros,

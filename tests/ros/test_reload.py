@@ -3,7 +3,6 @@
 import fcntl
 import os
 import pty
-import re
 import subprocess
 import sys
 import termios
@@ -14,14 +13,12 @@ import pytest
 
 from tests import preloaded
 from tests.preloaded import FROM_SCRATCH
-from tests.ros import relaying
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.processes import Process, wait_until
 from tests.ros.reloaded import ReloadedFile
 from tests.ros.stage import Stage
 from tests.ros.status import ANY_PORT, status
-from tests.ros.streams import at, merged
 
 pytestmark = pytest.mark.ros
 
@@ -31,26 +28,6 @@ _FRONT = {"policy": "approximate_time", "queue_size": ROOMY, "slop": "20ms", "to
 
 def _rear(*, topics: tuple[str, ...] = ("/camera", "/lidar"), **keys: Any) -> dict[str, Any]:
     return {"policy": "exact_time", "topics": inputs(dict.fromkeys(topics, VECTOR), qos=LOSSLESS), **keys}
-
-
-def test_a_faulty_file_changes_nothing_and_says_why(stage: Stage):
-    file = ReloadedFile(stage, front=_FRONT)
-    why = file.refuse(config({"front": {**_FRONT, "slopp": "1ms"}}, metrics=ANY_PORT))
-    # HTTP says where, and the log what stands there.
-    assert re.fullmatch(rf"{file.path}:\d+:\d+: unknown key\nthe relay's log says more, .*", why)
-    assert "reload failed; keeping the running configuration:" in file.relay.stderr
-    assert "groups.front.slopp: unknown key, did you mean `slop`?" in file.relay.stderr
-    assert "needs" not in file.refuse("")
-    why = file.refuse(config({"front": _FRONT}, metrics=ANY_PORT, node={"name": "other"}))
-    assert why == "`node` cannot change while the relay runs: restart it"
-    file.relay.wait_for_log(f"{why} (node.name: not set -> other)")
-    why = file.refuse(config({"front": _FRONT}, metrics={**ANY_PORT, "hosts": ["robot"]}))
-    assert why == "`metrics` cannot change while the relay runs: restart it"
-    file.relay.wait_for_log(f"{why} (metrics.hosts: not set -> [robot])")
-    recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
-    aligned = {"/front/camera": VECTOR, "/front/lidar": VECTOR}
-    collector, player = stage.collector(aligned), stage.player(_PAIR)
-    relaying.connect(player, collector, recording, aligned)
 
 
 def test_several_files_run_as_one_and_each_is_watched(stage: Stage):
