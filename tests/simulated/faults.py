@@ -108,6 +108,12 @@ def _returning(world: World, target: str, **changes: object) -> Callable[[], Non
     return lambda: exchange(driver, back[0])
 
 
+def _change(world: World, group: str) -> None:
+    world.changed[group] = world.changed.get(group, 0) + 1
+    world.write_file()
+    world.reload()
+
+
 @_kind("sensor", names="silent slowed", must=True)
 def silent(world: World, target: str, _: float) -> End:
     """The publisher is there, and sends nothing."""
@@ -238,8 +244,10 @@ def clock_set(world: World, _: str, __: float) -> End:
 
 @_kind(names="paused", must=True)
 def pause(world: World, _: str, __: float) -> End:
-    """~/pause, and ~/resume in the end."""
+    """~/pause, and ~/resume in the end; perhaps a group is exchanged meanwhile."""
     world.ask("pause")
+    if world.random.random() < 0.4:
+        world.scheduler.after(SECOND, partial(_change, world, world.random.choice(world.plan.groups).name))
     return partial(world.ask, "resume")
 
 
@@ -308,9 +316,7 @@ def reload_faulty(world: World, _: str, __: float) -> End:
 @_kind("group", "brief", names="no_publisher silent")
 def reload_changed(world: World, target: str, _: float) -> End:
     """A group is exchanged for one of other values."""
-    world.changed[target] = world.changed.get(target, 0) + 1
-    world.write_file()
-    world.reload()
+    _change(world, target)
     return None
 
 
@@ -335,9 +341,7 @@ def reload_without(world: World, target: str, _: float) -> End:
 def reload_refused(world: World, target: str, _: float) -> End:
     """DDS makes nothing on the outputs, while a group is exchanged."""
     world.refusal = "no memory"
-    world.changed[target] = world.changed.get(target, 0) + 1
-    world.write_file()
-    world.reload()
+    _change(world, target)
 
     def back() -> None:
         world.refusal = None
@@ -391,7 +395,7 @@ def clock_loops(world: World, _: str, __: float) -> End:
     return None
 
 
-@_kind("real", "played", "brief", names="time_jump clock_step", again_s=0.05)
+@_kind("real", "played", "brief", names="time_jump clock_step", again_s=0.0)
 def loops(world: World, _: str, __: float) -> End:
     """All sensors begin again, as a recording that is played in a loop."""
     world.shift_rig_clock(-world.random.choice([20, 600]) * SECOND)

@@ -197,7 +197,7 @@ def _sensor(chance: Random, number: int, *, every: int, exact: bool) -> Sensor:
         topic=f"/s{number}",
         every=chance.choice([1, 1, every]),
         wobble=0 if exact else 1 * MS,
-        takes=chance.randrange(1, 30) * MS,
+        takes=chance.choice([chance.randrange(1, 30), chance.randrange(1, 200)]) * MS,
         reliability=chance.choice(["reliable", "reliable", "best_effort"]),
         durability=chance.choice(["volatile", "volatile", "transient_local"]),
         depth=chance.choice([5, 10, 100]),

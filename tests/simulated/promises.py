@@ -12,6 +12,7 @@ from syncrelay.explain import explanation
 from tests.simulated.bus import Sample, Writer
 from tests.simulated.faults import KINDS, concerns, is_felt
 from tests.simulated.plan import HEALED_S, NAMED_S, SETTLED_S, TYPE, Group, Plan, Step
+from tests.simulated.scheduler import SECOND
 from tests.simulated.world import World, identity
 
 if TYPE_CHECKING:
@@ -285,7 +286,8 @@ class Promises:
         for number, at in self._written[anchor].items():
             if number % of and not group.repeats:
                 continue
-            if at > end or any(begin <= at <= over for begin, over in spoilt):
+            sampled = at - plan.sensor(anchor).takes / SECOND
+            if at > end or any(begin <= sampled <= over for begin, over in spoilt):
                 continue
             moment = number // of
             others = [self._written[topic].get(moment * plan.sensor(topic).every) for topic in triggers]
