@@ -4,6 +4,7 @@ import os
 import re
 import signal
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -65,8 +66,19 @@ def demo_for(stage, seconds):
 
 
 @pytest.mark.ros
-def test_it_matches_a_simulated_rig_and_sums_up(stage):
-    demo, seconds = demo_for(stage, 4)
+def test_it_matches_a_simulated_rig_until_a_signal_ends_it_sums_up_and_leaves_nothing(stage):
+    demo = stage.start("demo", [*_DEMO, "--seed", "7"])
+    demo.wait_until(
+        lambda: re.search(r"camera_lidar: .* span .* lidar_imu: .* span", demo.stdout), "sets of both groups"
+    )
+    sensors = children(demo.pid)
+    assert len(sensors) == 3
+    assert all(b"--seed=7" in Path(f"/proc/{pid}/cmdline").read_bytes() for pid in sensors)
+    stage.note_shared_memory()
+    demo.send(signal.SIGTERM)
+    assert demo.wait() == 0, demo.stderr
+    assert not any(map(running, sensors))
+    assert stage.left_in_shared_memory() == set()
     groups = summed_up(demo.stdout)
     assert set(groups) == {"camera_lidar", "lidar_imu"}
     for sets, _, p95, inputs in groups.values():
@@ -77,7 +89,8 @@ def test_it_matches_a_simulated_rig_and_sums_up(stage):
             assert received == matched + unneeded + dropped
     assert groups["camera_lidar"][1] < 3  # the offset is in use: without it, 12
     assert re.search(r"offset: -12 ms on /demo/camera/image_raw: span .* 1[12](\.\d+)? ms without it", demo.stdout)
-    assert len(re.findall(r"^ +\d+\.\d s  camera_lidar", demo.stdout, re.MULTILINE)) in range(1, seconds + 2)
+    seconds = [float(each) for each in re.findall(r"^ +(\d+\.\d) s  camera_lidar", demo.stdout, re.MULTILINE)]
+    assert all(after - before > 0.8 for before, after in pairwise(seconds))
     assert "\x1b" not in demo.stdout
     # Of what a busy machine makes of a rig, the relay may warn.
     assert [line for line in demo.said if not line.startswith("[WARN]")] == []
@@ -115,23 +128,6 @@ def test_it_fails_if_no_set_came(stage):
     demo = stage.start("demo", [*_DEMO, "--seconds", "1"])
     assert demo.wait() == 1
     assert re.search(r"^camera_lidar: .*no set yet", demo.stdout, re.MULTILINE)
-
-
-@pytest.mark.ros
-def test_a_signal_ends_it_with_the_summary_and_leaves_nothing(stage):
-    demo = stage.start("demo", [*_DEMO, "--seed", "7"])
-    demo.wait_until(
-        lambda: re.search(r"camera_lidar: .* span .* lidar_imu: .* span", demo.stdout), "sets of both groups"
-    )
-    sensors = children(demo.pid)
-    assert len(sensors) == 3
-    assert all(b"--seed=7" in Path(f"/proc/{pid}/cmdline").read_bytes() for pid in sensors)
-    stage.note_shared_memory()
-    demo.send(signal.SIGTERM)
-    assert demo.wait() == 0, demo.stderr
-    assert set(summed_up(demo.stdout)) == {"camera_lidar", "lidar_imu"}
-    assert not any(map(running, sensors))
-    assert stage.left_in_shared_memory() == set()
 
 
 @pytest.mark.ros
@@ -178,21 +174,11 @@ def test_a_terminal_sees_the_strip_and_keeps_the_summary(stage):
     assert set(summed_up(after)) == {"camera_lidar", "lidar_imu"}
 
 
-@pytest.mark.ros
-def test_a_terminal_that_cannot_draw_gets_plain_lines(stage):
-    screen = shown_on_terminal(stage, TERM="dumb")
-    assert "\x1b[?1049h" not in screen
-    assert "s  camera_lidar: " in screen
-
-
-def shown_on_terminal(stage, **environ):
-    """Run a demo to its end on a terminal; all that it wrote.
-
-    It runs for longer where a busy machine left a group without a set.
-    """
+def shown_on_terminal(stage):
+    """Run a demo to its end on a terminal, for longer where a busy machine left a group no set; all that it wrote."""
     for seconds in (3, 6, 15, 45):
         argv = [*_DEMO, "--seconds", f"{seconds}"]
-        with on_terminal(argv, folder=stage.folder, environ=stage.environment | environ) as terminal:
+        with on_terminal(argv, folder=stage.folder, environ=stage.environment) as terminal:
             code = terminal.wait_for_end()
         if code == 0:
             break

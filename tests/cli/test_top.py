@@ -39,8 +39,9 @@ def test_without_a_terminal_it_points_to_text(tmp_path):
     )
 
 
-def test_a_terminal_that_cannot_draw_gets_a_sentence(tmp_path):
-    with running(states.healthy()) as server, _top(server.url, tmp_path, PYTHONIOENCODING="latin-1") as top:
+@pytest.mark.parametrize("setting", [{"TERM": "dumb"}, {"PYTHONIOENCODING": "latin-1"}])
+def test_a_terminal_that_cannot_draw_gets_a_sentence(tmp_path, setting):
+    with running(states.healthy()) as server, _top(server.url, tmp_path, **setting) as top:
         assert top.wait_for_end() == 1
     assert "top cannot draw on this terminal: check TERM and LANG" in top.written
     assert "\x1b[?1049h" not in top.written
