@@ -34,17 +34,24 @@ class Kind:
     """Whether sets may be missing meanwhile."""
     again_s: float = 15.0
     """How long after its end they may be missing."""
+    at_end: bool = False
+    """Whether none may be missing before its end."""
 
 
 KINDS: Final[dict[str, Kind]] = {}
 
 
 def _kind(
-    *needs: str, names: str = "", must: bool = False, spoils: bool = True, again_s: float = 15.0
+    *needs: str,
+    names: str = "",
+    must: bool = False,
+    spoils: bool = True,
+    again_s: float = 15.0,
+    at_end: bool = False,
 ) -> Callable[[_Begin], _Begin]:
     def add(begin: _Begin) -> _Begin:
         name = begin.__name__
-        KINDS[name] = Kind(begin, needs, frozenset(names.split()), must, spoils, again_s)
+        KINDS[name] = Kind(begin, needs, frozenset(names.split()), must, spoils, again_s, at_end)
         return begin
 
     return add
@@ -337,7 +344,7 @@ def reload_without(world: World, target: str, _: float) -> End:
     return back
 
 
-@_kind("group", names="refused_by_dds")
+@_kind("group", names="refused_by_dds", at_end=True)
 def reload_refused(world: World, target: str, _: float) -> End:
     """DDS makes nothing on the outputs, while a group is exchanged."""
     world.refusal = "no memory"

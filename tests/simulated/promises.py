@@ -263,9 +263,10 @@ class Promises:
         spoiling = [step for step in plan.steps if KINDS[step.kind].spoils and concerns(step.kind, step.target, group)]
         # The first trigger after a jump has nothing that is older.
         at_least = 2.0 if group.repeats else 0.0
-        times = [
-            (each.at - _BEFORE_S, each.at + each.seconds + max(at_least, KINDS[each.kind].again_s)) for each in spoiling
-        ]
+        times = []
+        for step in spoiling:
+            kind, end = KINDS[step.kind], step.at + step.seconds
+            times.append(((end if kind.at_end else step.at) - _BEFORE_S, end + max(at_least, kind.again_s)))
         return [(0.0, SETTLED_S), *times]
 
     def _is_calm(self, group: Group, at: float) -> bool:
