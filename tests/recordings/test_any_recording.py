@@ -80,7 +80,7 @@ def _read_by_all(bag: Path, file: Path, folder: Path, about: str) -> None:
             raise
 
 
-_PLACES = chosen(short=2, long=100)
+_PLACES = chosen(short=1, long=100)
 
 
 @pytest.mark.timeout(chosen(short=600, long=3600))

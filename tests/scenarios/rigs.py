@@ -113,7 +113,7 @@ RIGS = {
             Stream(topic, 10, acts, shift_ms=shift_ms)
             for topic in ("camera", "lidar")
             for acts, shift_ms in (("1", 0), ("23", -20_000))
-        ],
+        ]
     ),
     # Messages that come too slowly, too late, at once, or not at all.
     "camera_halves": Scenario(**_of_rates((30, 15), (10, 10), "slowed", ["camera"])),
@@ -173,11 +173,7 @@ RIGS = {
         cure=["qos"],
     ),
     "camera_returns_as_points": Scenario(
-        streams=[
-            Stream("camera", 10, "1", **_CAMERA),
-            Stream("camera", 10, "23", type=POINT, **_CAMERA),
-            _LIDAR_10,
-        ],
+        streams=[Stream("camera", 10, "1", **_CAMERA), Stream("camera", 10, "23", type=POINT, **_CAMERA), _LIDAR_10],
         first="other_type",
         about=["camera"],
         cure=["type"],
@@ -218,9 +214,7 @@ RIGS = {
         cure=["offset"],
     ),
     "lidar_80_ms_off": Scenario(
-        streams=[Stream("camera", 2), Stream("lidar", 2, shift_ms=-80)],
-        first="over_slop",
-        cure=["offset"],
+        streams=[Stream("camera", 2), Stream("lidar", 2, shift_ms=-80)], first="over_slop", cure=["offset"]
     ),
     # GPS time is 18 s ahead of UTC, and a driver may count from the boot.
     "gps_time": Scenario(

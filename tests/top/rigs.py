@@ -5,15 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from syncrelay.config import GroupConfig, load_text
-from syncrelay.explain import (
-    Endpoint,
-    GroupReport,
-    GroupWatch,
-    InputGraph,
-    Mismatch,
-    RecentDrop,
-    judge,
-)
+from syncrelay.explain import Endpoint, GroupReport, GroupWatch, InputGraph, RecentDrop, judge
 from syncrelay.status import Phase, RelayState
 from syncrelay.sync import Match, Message
 
@@ -39,9 +31,6 @@ class Sensor:
     shift_ms: float = 0.0
     until_s: float = 1e9
     publishers: tuple[str, ...] = ("/driver",)
-    type: str | None = None
-    mismatch: Mismatch | None = None
-    unstamped: bool = False
     gaps_ms: tuple[tuple[float, float], ...] = ()
 
 
@@ -57,13 +46,7 @@ def simulated(
     """The state of a relay after so many seconds; a topic without a sensor has no publisher."""
     groups = tuple(_report(group, sensors, seconds, random.Random(seed)) for group in load_text(config).groups)
     return RelayState(
-        node=node,
-        config="fusion.yaml",
-        phase=phase,
-        uptime_s=seconds,
-        turned_s=0.0,
-        receives_by="rclpy",
-        groups=groups,
+        node=node, config="fusion.yaml", phase=phase, uptime_s=seconds, turned_s=0.0, receives_by="rclpy", groups=groups
     )
 
 
@@ -111,7 +94,7 @@ def _messages(sensor: Sensor, seconds: int, rng: random.Random) -> Iterator[tupl
             continue
         taken = _BEGAN + max(0, round(at))
         lag = sensor.lag_ms * MS * rng.uniform(1, 1.2)
-        yield taken + round(lag), 0 if sensor.unstamped else taken - round(sensor.behind_ms * MS)
+        yield taken + round(lag), taken - round(sensor.behind_ms * MS)
 
 
 def _graph(config: GroupConfig, index: int, sensor: Sensor | None) -> InputGraph:
@@ -120,8 +103,6 @@ def _graph(config: GroupConfig, index: int, sensor: Sensor | None) -> InputGraph
     return InputGraph(
         name=topic.topic,
         output=topic.output,
-        publishers=tuple(
-            Endpoint(name, sensor.type or topic.type or "", sensor.mismatch) for name in nodes if sensor is not None
-        ),
+        publishers=tuple(Endpoint(name, topic.type or "") for name in nodes if sensor is not None),
         subscribers=(Endpoint("/fusion", topic.type or ""),),
     )

@@ -4,7 +4,6 @@ import json
 from collections.abc import Mapping
 from functools import cache
 
-from syncrelay.explain import Mismatch
 from syncrelay.status import RelayState
 from tests.top.rigs import Sensor, simulated
 
@@ -64,19 +63,6 @@ def nothing() -> RelayState:
 
 
 @cache
-def incompatible() -> RelayState:
-    why = Mismatch("reliability", "best_effort", "reliable")
-    camera = Sensor(30, until_s=0, publishers=("/camera_driver",), mismatch=why)
-    return simulated(file(front=FRONT), {"/camera/image_raw": camera, "/lidar/points": LIDAR})
-
-
-@cache
-def unstamped() -> RelayState:
-    camera = Sensor(30, unstamped=True, publishers=("/camera_driver",))
-    return simulated(file(front=FRONT), {"/camera/image_raw": camera, "/lidar/points": LIDAR})
-
-
-@cache
 def without_its_optional_input() -> RelayState:
     front = group({"/camera/image_raw": IMAGE, "/lidar/points": CLOUD, "/radar/points": CLOUD}, max_wait="100ms")
     front["topics"][2]["required"] = False
@@ -110,8 +96,6 @@ ALL = {
     "rig": rig,
     "silent": silent,
     "nothing": nothing,
-    "incompatible": incompatible,
-    "unstamped": unstamped,
     "optional": without_its_optional_input,
     "twelve": twelve_groups,
     "sixteen": sixteen_inputs,

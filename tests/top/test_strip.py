@@ -32,32 +32,17 @@ def drawn(recent, window=_WINDOW, *, inputs=2, sets=None):
     [
         pytest.param(
             [a_set(45, 41), a_set(145, 141), a_set(240, 245)],
-            [
-                "  A    B    C",
-                "  │    │    │",
-                "  A    B    C",
-                " 4.0  4.0  5.0",
-            ],
+            ["  A    B    C", "  │    │    │", "  A    B    C", " 4.0  4.0  5.0"],
             id="a set is a letter on each lane, a joint between them, its span below",
         ),
         pytest.param(
             [a_set(45, 65), a_set(185, 165)],
-            [
-                "  A      B",
-                "  ╰╮    ╭╯",
-                "   A    B",
-                "  20.0 20.0",
-            ],
+            ["  A      B", "  ╰╮    ╭╯", "   A    B", "  20.0 20.0"],
             id="joints lean as the stamps do",
         ),
         pytest.param(
             [a_set(45, 105), a_set(320, 220)],
-            [
-                "  A             B",
-                "  ╰──╮     ╭────╯",
-                "     A     B",
-                "    60.0 100.0",
-            ],
+            ["  A             B", "  ╰──╮     ╭────╯", "     A     B", "    60.0 100.0"],
             id="a wide set has a long joint",
         ),
         pytest.param(
@@ -85,11 +70,7 @@ def drawn(recent, window=_WINDOW, *, inputs=2, sets=None):
             ["  A B  C", "  │ │  │", "  A B  C", " 0.0  0.0"],
             id="a span that would touch its neighbour is left out",
         ),
-        pytest.param(
-            [a_set(-1, -20)],
-            ["", "", "", ""],
-            id="what is older than the strip is not on it",
-        ),
+        pytest.param([a_set(-1, -20)], ["", "", "", ""], id="what is older than the strip is not on it"),
     ],
 )
 def test_messages_stand_on_their_lanes_by_their_stamps(recent, lanes):

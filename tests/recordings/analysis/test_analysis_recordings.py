@@ -75,10 +75,7 @@ _RIGS: Final = {
     "gps": Rig(
         bag=_GPS,
         topics=("/gps", "/odometry"),
-        delays_us={
-            "/gps": (5_700_748_426_499, 5_700_748_432_640),
-            "/odometry": (5_700_748_426_515, 5_700_748_445_308),
-        },
+        delays_us={"/gps": (5_700_748_426_499, 5_700_748_432_640), "/odometry": (5_700_748_426_515, 5_700_748_445_308)},
         distances_us={("/gps", "/odometry"): (23_608, 26_021, 27_595)},
     ),
     "gps without stamps": Rig(

@@ -24,7 +24,7 @@ from tests.ros.cdr_messages import IMAGE
 from tests.ros.frames import Frame
 
 _SEED = 28
-_COUNT = chosen(short=64, long=1000)
+_COUNT = chosen(short=24, long=1000)
 _LARGEST = chosen(short=1 << 25, long=1 << 28)
 # Smaller than they are, so that small bombs are too large.
 _FITS = 1 << 20

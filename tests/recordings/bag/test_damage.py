@@ -15,7 +15,7 @@ from tests.recordings.bag.damage import FRAMES, KINDS, damaged, with_lying_lengt
 pytestmark = pytest.mark.faults
 
 # Of each kind; of each format there are two kinds or more.
-_PLACES = chosen(short=200, long=4000)
+_PLACES = chosen(short=50, long=4000)
 _LIES = chosen(short=15, long=500)
 _YEAR_2116 = 2**62
 # The recordings have 10 kB. A wrong length asks for a thousand times as much as this.

@@ -4,6 +4,7 @@ import os
 import sqlite3
 import struct
 import tracemalloc
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import pytest
 import zstandard
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
+from mcap.records import ChunkIndex
 from mcap.writer import CompressionType
 
 from syncrelay.errors import BagError
@@ -19,6 +21,7 @@ from syncrelay.recordings.bag import open_recording
 from syncrelay.recordings.bag.effort import Effort
 from syncrelay.recordings.bag.recording import LATEST
 from syncrelay.recordings.bag.unpacking import unlz4, unzstd
+from tests.recordings.bag.bombs import zstd_piecewise
 from tests.recordings.bag.making import ROS1_STORE, rig, write_mcap, write_rosbag2
 from tests.recordings.bag.reading import read
 from tests.ros.cdr_messages import VECTOR
@@ -88,7 +91,34 @@ def test_of_tables_that_lie_the_rest_is_read(lie, expected, faults, tmp_path):
     assert all(fault.startswith(begin) for fault, begin in zip(found, faults, strict=True))
 
 
-@pytest.mark.parametrize("time", [LATEST + 1, 2**63, 2**64 - 1])
+def _mcap(folder: Path, change: Callable[[bytearray], object] = bytes, **options: Any) -> Path:
+    """An MCAP file of the rig, of which `change` makes another."""
+    path = write_mcap(folder / "rig.mcap", _RIG, **options)
+    content = bytearray(path.read_bytes())
+    change(content)
+    path.write_bytes(content)
+    return path
+
+
+def _with(old: bytes, new: bytes) -> Callable[[bytearray], None]:
+    """What replaces the last such bytes of a file."""
+
+    def change(content: bytearray) -> None:
+        at = content.rindex(old)
+        content[at : at + len(new)] = new
+
+    return change
+
+
+def _flip(content: bytearray, payload: bytes, place: int = 0) -> None:
+    content[content.index(payload) + place % len(payload)] ^= 1
+
+
+# The first message of the file, and of its channel.
+_FIRST = struct.pack("<BQH", Opcode.MESSAGE, 22 + len(_RIG[0].payload), 1)
+
+
+@pytest.mark.parametrize("time", [LATEST + 1, 2**64 - 1])
 @pytest.mark.parametrize(
     "options", [{}, {"use_chunking": False}, {"chunk_size": 300}], ids=["chunk", "loose", "chunks"]
 )
@@ -100,22 +130,13 @@ def test_an_mcap_message_of_a_time_that_no_clock_shows_is_left_out(time, options
         assert recording.end <= LATEST
 
 
-_LOOSE: dict[str, Any] = {
-    "use_chunking": False,
-    "use_summary_offsets": False,
-    "repeat_channels": False,
-    "repeat_schemas": False,
-}
-
-
 @pytest.mark.parametrize("opcode", [Opcode.SCHEMA, Opcode.CHANNEL])
 def test_a_damaged_description_outside_of_chunks_is_said(opcode, tmp_path):
-    path = write_mcap(tmp_path / "rig.mcap", _RIG, **_LOOSE)
-    content = bytearray(path.read_bytes())
-    name = b"/camera" if opcode == Opcode.CHANNEL else VECTOR.encode()
-    content[content.index(name)] = 0xFF
-    path.write_bytes(content)
-    frames, faults, _ = read(path)
+    def change(content: bytearray) -> None:
+        content[content.index(b"/camera" if opcode == Opcode.CHANNEL else VECTOR.encode())] = 0xFF
+
+    loose = {"use_chunking": False, "use_summary_offsets": False, "repeat_channels": False, "repeat_schemas": False}
+    frames, faults, _ = read(_mcap(tmp_path, change, **loose))
     assert [frame.payload for frame in _RIG if frame.topic == "/lidar"] == [
         frame.payload for frame in frames if frame.topic == "/lidar"
     ]
@@ -123,35 +144,25 @@ def test_a_damaged_description_outside_of_chunks_is_said(opcode, tmp_path):
 
 
 def test_a_message_of_no_channel_is_counted(tmp_path):
-    path = write_mcap(tmp_path / "rig.mcap", _RIG, enable_crcs=False)
-    content = bytearray(path.read_bytes())
-    head = struct.pack("<BQH", Opcode.MESSAGE, 22 + len(_RIG[0].payload), 1)
-    content[content.index(head) + 9] = 77
-    path.write_bytes(content)
-    assert read(path) == (_RIG[1:], [f"1 message {_STRAYS}"], [])
+    path = _mcap(tmp_path, _with(_FIRST, _FIRST[:-2] + b"\x4d\0"), enable_crcs=False)
+    assert read(path)[1] == [f"1 message {_STRAYS}"]
 
 
-@pytest.mark.parametrize("length", [2**20, 2**40, 2**64 - 1])
+@pytest.mark.parametrize("length", [2**20, 2**64 - 1])
 def test_an_mcap_record_that_is_no_message_and_ends_behind_its_chunk_is_said(length, tmp_path):
-    path = write_mcap(tmp_path / "rig.mcap", _RIG, enable_crcs=False, compression=CompressionType.NONE)
-    content = bytearray(path.read_bytes())
-    first = content.index(struct.pack("<BQH", Opcode.MESSAGE, 22 + len(_RIG[0].payload), 1))
-    content[first : first + 9] = struct.pack("<BQ", Opcode.ATTACHMENT, length)
-    path.write_bytes(content)
-    frames, (fault,), _ = read(path)
+    def change(content: bytearray) -> None:
+        at = content.index(_FIRST)
+        content[at : at + 9] = struct.pack("<BQ", Opcode.ATTACHMENT, length)
+
+    frames, (fault,), _ = read(_mcap(tmp_path, change, enable_crcs=False))
     assert frames == []
     assert fault.endswith("is damaged and left out: a record in it ends behind it")
 
 
-@pytest.mark.parametrize("place", [0, 4, 11, 20, -1])
-@pytest.mark.parametrize("number", [0, 5, 11])
+@pytest.mark.parametrize(("number", "place"), [(0, 0), (5, 11), (11, -1)])
 def test_a_chunk_of_a_wrong_checksum_is_left_out(number, place, tmp_path):
     """The flipped bit is in a payload, so that only the checksum can show it."""
-    path = write_mcap(tmp_path / "rig.mcap", _RIG, chunk_size=300)
-    content = bytearray(path.read_bytes())
-    payload = _RIG[number].payload
-    content[content.index(payload) + place % len(payload)] ^= 1
-    path.write_bytes(content)
+    path = _mcap(tmp_path, lambda content: _flip(content, _RIG[number].payload, place), chunk_size=300)
     frames, (fault,), _ = read(path)
     assert set(frames) < set(_RIG)
     assert _RIG[number] not in frames
@@ -163,7 +174,7 @@ def test_of_many_damaged_places_the_first_are_named_and_the_others_counted(tmp_p
     path = write_mcap(tmp_path / "rig.mcap", frames, chunk_size=1)
     content = bytearray(path.read_bytes())
     for frame in frames:
-        content[content.index(frame.payload)] ^= 1
+        _flip(content, frame.payload)
     path.write_bytes(content)
     found, faults, _ = read(path)
     assert found == []
@@ -173,28 +184,29 @@ def test_of_many_damaged_places_the_first_are_named_and_the_others_counted(tmp_p
 
 
 def test_an_mcap_file_that_ends_between_two_records_is_said(tmp_path):
-    path = write_mcap(tmp_path / "rig.mcap", _RIG, use_chunking=False)
-    content = path.read_bytes()
-    last = struct.pack("<BQ", Opcode.MESSAGE, 22 + len(_RIG[-1].payload))
-    path.write_bytes(content[: content.rindex(last)])
-    assert read(path) == (_RIG[:-1], [_NOT_CLOSED], [])
+    def change(content: bytearray) -> None:
+        del content[content.rindex(struct.pack("<BQ", Opcode.MESSAGE, 22 + len(_RIG[-1].payload))) :]
+
+    assert read(_mcap(tmp_path, change, use_chunking=False)) == (_RIG[:-1], [_NOT_CLOSED], [])
 
 
-@pytest.mark.parametrize("lie", [0, 9, 2**40, 2**63, 2**64 - 1])
-def test_an_mcap_file_whose_index_lies_is_gone_through(lie, tmp_path):
-    path = write_mcap(tmp_path / "rig.mcap", _RIG, chunk_size=300, enable_crcs=False)
-    content = path.read_bytes()
+def _chunks(path: Path) -> Sequence[ChunkIndex]:
     with path.open("rb") as file:
         summary = make_reader(file).get_summary()
         assert summary is not None
-        begin = summary.chunk_indexes[1].chunk_start_offset
-    at = content.rindex(struct.pack("<Q", begin))
-    path.write_bytes(content[:at] + struct.pack("<Q", lie) + content[at + 8 :])
-    assert read(path) == (_RIG, [], [])
+        return summary.chunk_indexes
+
+
+@pytest.mark.parametrize("lie", [0, 9, 2**40, 2**64 - 1])
+def test_an_mcap_file_whose_index_lies_is_gone_through(lie, tmp_path):
+    options: dict[str, Any] = {"chunk_size": 300, "enable_crcs": False}
+    begin = _chunks(_mcap(tmp_path, **options))[1].chunk_start_offset
+    change = _with(struct.pack("<Q", begin), struct.pack("<Q", lie))
+    assert read(_mcap(tmp_path, change, **options)) == (_RIG, [], [])
 
 
 def test_no_summary_is_read_that_is_larger_than_any(tmp_path):
-    path = write_mcap(tmp_path / "rig.mcap", _RIG, enable_crcs=False)
+    path = _mcap(tmp_path, enable_crcs=False)
     content = path.read_bytes()
     # The footer and the magic bytes, behind a record that is a hole of 300 MB.
     end = len(content) - struct.calcsize("<BQQQI") - 8
@@ -213,62 +225,43 @@ def test_no_summary_is_read_that_is_larger_than_any(tmp_path):
 
 
 def test_messages_that_come_behind_later_ones_are_read_and_said(tmp_path):
-    path = write_mcap(tmp_path / "rig.mcap", _RIG, chunk_size=300, enable_crcs=False)
-    content = path.read_bytes()
-    with path.open("rb") as file:
-        summary = make_reader(file).get_summary()
-        assert summary is not None
-        first = summary.chunk_indexes[0]
+    options: dict[str, Any] = {"chunk_size": 300, "enable_crcs": False}
+    first = _chunks(_mcap(tmp_path, **options))[0]
     # The index says that the first chunk begins, and ends, an hour later.
-    times = struct.pack("<QQ", first.message_start_time, first.message_end_time)
-    later = struct.pack("<QQ", first.message_start_time + 3600 * 10**9, first.message_end_time + 3600 * 10**9)
-    at = content.rindex(times)
-    path.write_bytes(content[:at] + later + content[at + 16 :])
+    true = first.message_start_time, first.message_end_time
+    later = [each + 3600 * 10**9 for each in true]
+    path = _mcap(tmp_path, _with(struct.pack("<QQ", *true), struct.pack("<QQ", *later)), **options)
     frames, (fault,), _ = read(path)
     assert sorted(frames, key=_RIG.index) == _RIG
     assert fault.endswith("out of order: the index has other times")
 
 
-@pytest.mark.parametrize("size", [2**31, 2**40, 2**62, 2**63, 2**64 - 1])
+@pytest.mark.parametrize("size", [2**31, 2**62, 2**64 - 1])
 @pytest.mark.parametrize("compression", list(CompressionType))
 def test_a_chunk_that_says_it_is_larger_than_the_file_is_left_out(compression, size, tmp_path):
-    path = write_mcap(tmp_path / "rig.mcap", _RIG, compression=compression)
-    content = path.read_bytes()
     word = {CompressionType.NONE: b"", CompressionType.LZ4: b"lz4", CompressionType.ZSTD: b"zstd"}[compression]
-    # Behind both times, the unpacked size and the checksum.
-    at = content.index(struct.pack("<I", len(word)) + word, content.index(struct.pack("<Q", _RIG[-1].time)) + 20)
-    data = at + 4 + len(word)
-    path.write_bytes(content[:data] + struct.pack("<Q", size) + content[data + 8 :])
-    frames, (fault,), _ = read(path)
+
+    def change(content: bytearray) -> None:
+        # Behind both times, the unpacked size and the checksum.
+        at = content.index(struct.pack("<I", len(word)) + word, content.index(struct.pack("<Q", _RIG[-1].time)) + 20)
+        data = at + 4 + len(word)
+        content[data : data + 8] = struct.pack("<Q", size)
+
+    frames, (fault,), _ = read(_mcap(tmp_path, change, compression=compression))
     assert frames == []
     assert "the chunk at byte" in fault
     assert "is damaged and left out" in fault
 
 
-def test_frames_that_tell_no_size_are_unpacked_and_what_is_cut_off_is_not():
-    content = os.urandom(100_000) + bytes(5_000_000)
-    stream = zstandard.ZstdCompressor().compressobj()
-    packed = stream.compress(content) + stream.flush()
-
-    def unpack(packed: bytes) -> bytes:
-        return unzstd(packed, Effort())
-
-    assert unpack(packed) == unpack(zstandard.compress(content)) == content
-    for cut in (packed[:-10], packed[: len(packed) // 2], b"", packed[:4]):
-        with pytest.raises((EOFError, zstandard.ZstdError)):
-            unpack(cut)
+def test_no_frame_unpacks_to_more_or_less_than_it_says():
+    whole = zstandard.compress(bytes(70_000))
+    lying = bytearray(whole)
+    _with(struct.pack("<I", 70_000), struct.pack("<I", 2**32 - 1))(lying)
+    for cut in (bytes(lying), whole[:-3], zstd_piecewise(bytes(70_000))[:-3], b"", whole[:4]):
+        with pytest.raises((EOFError, ValueError, zstandard.ZstdError)):
+            unzstd(cut, Effort())
     with pytest.raises((EOFError, RuntimeError)):
         unlz4(b"\x04\x22\x4d\x18", Effort())
-
-
-def test_no_frame_unpacks_to_more_than_it_can_hold():
-    packed = bytearray(zstandard.compress(bytes(70_000)))
-    params = zstandard.get_frame_parameters(bytes(packed))
-    assert params.content_size == 70_000
-    at = bytes(packed).index(struct.pack("<I", 70_000))
-    packed[at : at + 4] = struct.pack("<I", 2**32 - 1)
-    with pytest.raises((ValueError, zstandard.ZstdError)):
-        unzstd(bytes(packed), Effort())
 
 
 def test_a_ros1_bag_without_a_message_has_its_topics(tmp_path):

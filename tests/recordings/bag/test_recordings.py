@@ -40,10 +40,7 @@ def test_the_sets_of_a_replay_are_those_that_the_relay_gives(case, real_data: Pa
     bag = real_data / named if named else write_mcap(tmp_path / "bag.mcap", frames)
     types = relaying.topics_of(frames)
     group = {**case.group, "manifest": False, "topics": inputs({topic: types[topic] for topic in case.topics})}
-    with (
-        bound(bag, text=config({case.name: group})) as (recording, bindings),
-        McapOutput(tmp_path / "out") as output,
-    ):
+    with bound(bag, text=config({case.name: group})) as (recording, bindings), McapOutput(tmp_path / "out") as output:
         writer = SetWriter(output)
         for binding in bindings:
             writer.begin(binding)

@@ -5,15 +5,7 @@ import pytest
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag.replay import replay
 from syncrelay.sync import Drop, DropReason, Match
-from tests.recordings.bag.making import (
-    CUSTOM,
-    CUSTOM_STORE,
-    HEADERLESS,
-    blip,
-    rig,
-    write_mcap,
-    write_ros1,
-)
+from tests.recordings.bag.making import CUSTOM, CUSTOM_STORE, HEADERLESS, blip, rig, write_mcap, write_ros1
 from tests.recordings.bag.reading import bound
 from tests.ros.cdr_messages import STRING, TIME_REFERENCE, VECTOR, header, serialize, time
 from tests.ros.configs import config, inputs
@@ -66,9 +58,7 @@ _OTHER = Frame("/camera", TIME_REFERENCE, BEGIN, serialize(TIME_REFERENCE, heade
         (
             [_OTHER, *rig(2)],
             [{"topic": "/camera"}, {"topic": "/lidar"}],
-            [
-                f"/camera is recorded as {TIME_REFERENCE} and {VECTOR}, {_WHICH}",
-            ],
+            [f"/camera is recorded as {TIME_REFERENCE} and {VECTOR}, {_WHICH}"],
         ),
     ],
     ids=["no such topic", "another type", "two types and none in the file"],

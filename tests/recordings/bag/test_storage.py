@@ -137,7 +137,7 @@ def test_an_index_that_hides_a_channel_is_told_by_the_statistics(server, tmp_pat
 def test_whatever_became_of_it_is_read_as_a_file_of_this_machine_is(kind, server, tmp_path):
     path = KINDS[kind](tmp_path)
     url = server.url("/rig")
-    for what, content in damaged(path.read_bytes(), places=6, seed=19):
+    for what, content in damaged(path.read_bytes(), places=chosen(short=2, long=20), seed=19):
         path.write_bytes(content)
         server.files["/rig"] = content
         for topics in (None, {"/camera"}):
@@ -393,13 +393,7 @@ def _is_near(place: int, spans: Sequence[tuple[int, int]]) -> bool:
 
 @pytest.mark.real_data
 @pytest.mark.parametrize(
-    "bag",
-    [
-        "event_camera_mcap/test_events_2/test_events_2_0.mcap",
-        "gps_odom_uf_rosbag2/bag/bag_0.db3",
-        "husky_jackal_robot_localization/test1.bag",
-        "multicam_tagslam/test_2.tag_detections.bag.bz2",
-    ],
+    "bag", ["event_camera_mcap/test_events_2/test_events_2_0.mcap", "multicam_tagslam/test_2.tag_detections.bag.bz2"]
 )
 def test_real_recordings_are_the_same_behind_a_url(bag, server, real_data: Path):
     path = real_data / bag
