@@ -1,3 +1,6 @@
+from dataclasses import replace
+from itertools import accumulate
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -47,12 +50,14 @@ def test_ticks_are_whole_nanoseconds_that_do_not_drift(ticks, index, expected):
     denominator=st.integers(1, 10**9),
     time=st.integers(-(10**18), 4 * 10**18),
 )
-def test_every_time_lies_between_two_ticks(numerator, denominator, time):
+def test_every_time_lies_between_two_ticks_and_a_period_is_rounded_up(numerator, denominator, time):
     ticks = Ticks(min(numerator, 10_000 * denominator), denominator)
     last = ticks.last_until(time)
     assert ticks.at(last) <= time < ticks.at(last + 1)
     first = ticks.first_from(time)
     assert ticks.at(first - 1) < time <= ticks.at(first)
+    assert 0 <= ticks.period_ns * ticks.numerator - ticks.at(ticks.numerator) < ticks.numerator
+    assert ticks.hz * ticks.period_ns == pytest.approx(10**9, rel=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -120,7 +125,7 @@ def test_the_queue_that_is_needed_has_room_for_every_tick_that_is_waited_for():
 _RATES = (Ticks(100), Ticks(20), Ticks(30), Ticks(2997, 100), Ticks(300), Ticks(3, 2))
 
 
-def clocked(chosen, ticks, queue=1000):
+def clocked(chosen, ticks, queue):
     policy = LatestAtTicks(n_inputs=chosen.n_inputs, queue_size=queue, ticks=ticks, max_ages_ns=chosen.max_ages_ns)
     return grouped(
         policy,
@@ -147,10 +152,20 @@ def slow_sets(chosen, ticks, taken):
 
 
 @given(chosen=options(thinned=False), ticks=st.sampled_from(_RATES), data=st.data())
-def test_sets_are_those_of_the_rule(chosen, ticks, data):
-    taken = data.draw(steps(chosen.n_inputs, disorder=False))
+def test_with_the_queue_that_is_needed_sets_are_those_of_the_rule(chosen, ticks, data):
+    taken = [
+        step for step in data.draw(steps(chosen.n_inputs, jumps=False)) if step.message is None or step.message.stamp
+    ]
+    clocks = accumulate((step.now for step in taken), max)
+    taken = [replace(step, now=clock) for step, clock in zip(taken, clocks, strict=True)]
+    short = clocked(chosen, ticks, queue=chosen.queue_size)
+    for step in taken:
+        for drop in take(short, step):
+            if isinstance(drop, Drop) and drop.reason is DropReason.OVERFLOW:
+                assert short.counts()[drop.message.input].buffered == chosen.queue_size
+    needed = max(each.needed_queue or chosen.queue_size for each in short.counts())
     if taken:
-        left = sets_of(outcome for outcomes in run(clocked(chosen, ticks), taken) for outcome in outcomes)
+        left = sets_of(outcome for outcomes in run(clocked(chosen, ticks, queue=needed), taken) for outcome in outcomes)
         assert [(match.tick, match.stamps) for match in left] == list(slow_sets(chosen, ticks, taken))
 
 

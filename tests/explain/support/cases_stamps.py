@@ -47,7 +47,7 @@ FOUND = {
     "stamps of GPS time since 1980": a_silent_group(camera(figures={"delay": 315_964_782 * S}), LIDAR),
     "stamps of TAI": a_silent_group(camera(figures={"delay": -37 * S}), LIDAR),
     "stamps of GPS time since 1970": a_silent_group(camera(figures={"delay": -18 * S}), LIDAR),
-    "stamps of local time": a_silent_group(camera(figures={"delay": 7200 * S}), LIDAR),
+    "stamps of local time": a_silent_group(camera(offset=-S, figures={"delay": 7199 * S}), LIDAR),
     **{
         f"stamps that are off the clock that triggers: {name}": a_silent_group(
             *(an_input(each, figures={"delay": None, "delays": (40 * S,) * 20}) for each in ("/camera", "/lidar")),
