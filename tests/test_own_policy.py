@@ -21,17 +21,14 @@ from syncrelay.recordings.analysis import GroupAnalysis, analyze
 from syncrelay.recordings.bag import open_recording
 from syncrelay.recordings.bag.bindings import bind
 from tests.cli.command import run, run_here, run_python
+from tests.conformance.script import do, short
 from tests.dataflow.payloads import FLOWS
 from tests.faults.extent import chosen
 from tests.own_policies import installed_example, offer, on_path
 from tests.recordings.bag.making import write_mcap
-from tests.ros import relaying
-from tests.ros.cdr_messages import VECTOR, stamps_of
+from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import LOSSLESS, config, inputs
 from tests.ros.frames import Frame
-from tests.ros.reloaded import ReloadedFile
-from tests.ros.stage import Stage
-from tests.ros.status import findings, first_group, wait_for_finding
 from tests.ros.streams import MS, at, merged
 
 _TOPICS = ("/left", "/right")
@@ -133,26 +130,24 @@ def test_a_recording_is_judged_by_it_and_its_own_key_is_suggested(package: Path,
                 assert abs(by) + 1 <= float(wider[1]) <= 1.25 * abs(by) + 2, f"{drawn}: {finding.suggestion}"
 
 
-@pytest.mark.ros
-def test_a_relay_matches_by_it_says_what_is_wrong_and_takes_another_value(package: Path, stage: Stage):
-    stage.environment["PYTHONPATH"] += f":{package}"
-    file = ReloadedFile(stage, fused=_keys(reach="1ms"))
-    player = stage.player(_TYPES)
-    player.match()
-    far = merged(at("/left", *range(0, 6000, 100)), at("/right", *range(7, 6007, 100)))
-    player.start(far, speed=1)
-    found = wait_for_finding(file.relay, "over_slop", group="fused")
-    player.stop()
-    assert "over reach 1 ms" in found["text"]
-    file.reload(fused=_keys(reach="10ms"))
-    aligned = {"/fused/left": VECTOR, "/fused/right": VECTOR}
-    collector = stage.collector(aligned)
-    sets = (at("/left", offset) + at("/right", offset + 7) for offset in range(10_000, 100_000, 100))
-    _, out = relaying.one_set(player, collector, sets, list(aligned))
-    left, right = stamps_of(out)
-    assert right - left == 7 * MS
-    assert first_group(file.relay)["policy"] == "led_by"
-    assert "over_slop" not in findings(file.relay, "fused")
+def test_a_relay_matches_by_it_says_what_is_wrong_and_takes_another_value(package: Path, tmp_path: Path):
+    far = [(do.write("/left", n), do.write("/right", n + 7), do.sleep(0.1)) for n in range(0, 6000, 100)]
+    steps = (
+        *(do.publisher(topic) for topic in _TOPICS),
+        *(do.relay({"fused": _keys(reach="1ms")}), do.ready(), *(step for steps in far for step in steps)),
+        *(do.finding("over_slop", "fused"), do.file({"fused": _keys(reach="10ms")}), do.hang_up(reloads=1)),
+        *(do.subscriber(f"/fused{topic}") for topic in _TOPICS),
+        *(do.ready(), do.feed("/left", 10_000), do.feed("/right", 10_007), do.feed("/left", 10_100)),
+        *(do.out(f"/fused{topic}", 1) for topic in _TOPICS),
+    )
+    player, simulated = (
+        pytest.importorskip(f"tests.conformance.{name}", reason="rclpy is not installed")
+        for name in ("player", "simulated")
+    )
+    with on_path(package), simulated.SimulatedWorld(1) as world:
+        seen = player.play(short("a policy of another package", *steps), world, tmp_path)
+    assert "over reach #" in seen.notes[0][1]
+    assert seen.outputs == {"/fused/left": ["10000.000 /left"], "/fused/right": ["10007.000 /right"]}
 
 
 _MODEL = """

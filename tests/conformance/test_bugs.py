@@ -4,6 +4,8 @@ from itertools import count
 
 import pytest
 
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
 from syncrelay.config import GroupConfig
 from syncrelay.relay.groups import Groups
 from syncrelay.sync.group import SyncGroup

@@ -2,6 +2,8 @@
 
 import pytest
 
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.relay.inputs import TopicInput
 from tests.faults.extent import chosen
