@@ -119,12 +119,11 @@ def test_an_analysis_is_written_to_a_store_and_over_its_own_report_alone(folder)
     assert (done.returncode, "store://day: already exists and is not overwritten" in done.stderr) == (1, True)
 
 
-@pytest.mark.parametrize(("command", "option"), [("export", "-o"), ("replay", "--into")])
-def test_the_results_of_a_fleet_are_kept_in_a_store_and_done_once(command, option, folder):
+def test_the_results_of_a_fleet_are_kept_in_a_store_and_done_once(folder):
     (folder / "day").mkdir()
     for name in ("a", "b"):
         write_mcap(folder / "day" / f"{name}.mcap", rig())
-    words = [command, "day", "--config", "f.yaml", "--jobs", "2", option]
+    words = ["export", "day", "--config", "f.yaml", "--jobs", "2", "-o"]
     done = stored_by_process(folder, *words, "store://results/of day", wrong=1)
     assert (done.returncode, done.stdout) == (0, "store://results/of day: 2 recordings: 2 done\n"), done.stderr
     into = folder / "store" / "results" / "of day"
@@ -132,10 +131,9 @@ def test_the_results_of_a_fleet_are_kept_in_a_store_and_done_once(command, optio
     assert names(into) == names(folder / "here")
     entries = [json.loads(line) for line in (into / "_ledger.jsonl").read_text().splitlines()[1:]]
     assert [entry["state"] for entry in entries] == ["done", "done"]
-    if command == "export":
-        assert "--overwrite" in stored_by_process(folder, *words, "store://results/of day", "--raw").stderr
-        tables = [pyarrow.dataset.dataset(where).to_table().num_rows for where in (str(into), str(folder / "here"))]
-        assert tables[0] == tables[1] > 70
+    assert "--overwrite" in stored_by_process(folder, *words, "store://results/of day", "--raw").stderr
+    tables = [pyarrow.dataset.dataset(where).to_table().num_rows for where in (str(into), str(folder / "here"))]
+    assert tables[0] == tables[1] > 70
 
     assert stored_by_process(folder, *words, "store://results/of day").stdout.endswith("2 done before\n")
     next(into.glob("b-*/*")).unlink()

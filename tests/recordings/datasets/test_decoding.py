@@ -18,6 +18,7 @@ from tests.recordings.datasets.reference_decoder import decode
 from tests.ros.cdr_messages import STORE
 
 _JAZZY = get_typestore(Stores.ROS2_JAZZY)
+_TYPES = chosen(short=45, long=5000)
 _PACKAGES = sorted({name.split("/")[0] for name in _JAZZY.fielddefs})
 
 
@@ -26,9 +27,9 @@ def decoder(store, name, *paths):
 
 
 def test_every_field_of_any_type_has_the_value_that_was_serialized():
-    """170 types of seed 29, a dozen messages each, in both byte orders; some are missing."""
+    """Types of seed 29, a dozen messages each, in both byte orders; some are missing."""
     messages = large = 0
-    for number in range(chosen(short=170, long=5000)):
+    for number in range(_TYPES):
         chance = random.Random(f"29 {number}")
         store, name = drawn_type(chance)
         drawn = drawn_messages(store, name, chance, count=12)
@@ -40,8 +41,8 @@ def test_every_field_of_any_type_has_the_value_that_was_serialized():
         assert repr(column.to_pylist()) == repr(expected), (number, store.fielddefs)
         messages += 12 - len(gone)
         large += sum(len(each) > LARGE for each in drawn.payloads)
-    assert messages > 1500
-    assert large > 30
+    assert messages > 9 * _TYPES
+    assert large > _TYPES / 6
 
 
 @pytest.mark.parametrize("package", _PACKAGES)
@@ -56,9 +57,9 @@ def test_nothing_of_any_type_of_ros_2_is_lost(package):
 
 
 def test_damaged_messages_are_what_a_slow_decoder_makes_of_each_and_harm_no_other():
-    """170 types of seed 30: bytes are changed, cut off and added."""
+    """Types of seed 30: bytes are changed, cut off and added."""
     lost = 0
-    for number in range(chosen(short=170, long=5000)):
+    for number in range(_TYPES):
         chance = random.Random(f"30 {number}")
         store, name = drawn_type(chance)
         payloads = [_damaged(each, chance) for each in drawn_messages(store, name, chance).payloads]
@@ -67,7 +68,7 @@ def test_damaged_messages_are_what_a_slow_decoder_makes_of_each_and_harm_no_othe
         assert repr(found.decode(payloads).to_pylist()) == repr(expected), (number, store.fielddefs)
         assert found.undecodable == expected.count(None)
         lost += found.undecodable
-    assert lost > 150
+    assert lost > 0.8 * _TYPES
 
 
 def _damaged(payload: bytes, chance: random.Random) -> bytes:
@@ -132,15 +133,15 @@ def test_only_the_fields_asked_for_are_given():
 
 
 def test_any_field_may_be_asked_for_alone():
-    """All fields of every type of ROS 2, one after another, also within arrays."""
+    """All fields of the types of ROS 2, or of a quarter of them, one after another, also within arrays."""
     asked = 0
-    for name in _JAZZY.fielddefs:
+    for name in [*_JAZZY.fielddefs][:: chosen(short=4, long=1)]:
         drawn = drawn_messages(_JAZZY, name, random.Random(name), count=3)
         for field in drawn.values[0] if drawn.values else {}:
             found = decoder(_JAZZY, name, field).decode(drawn.payloads).to_pylist()
             assert repr(found) == repr([{field: each[field]} for each in drawn.values]), (name, field)
             asked += 1
-    assert asked > 500
+    assert asked > chosen(short=100, long=500)
 
 
 @pytest.mark.parametrize(

@@ -199,7 +199,7 @@ def test_a_video_has_the_same_bytes_each_time(tmp_path):
     pictures = [np.full((48, 64, 3), (9 * each, 200 - 5 * each, 3 * each), np.uint8) for each in range(20)]
     contents = set()
     # Where x264 builds macroblock trees, one of fifty or so differs.
-    for number in range(chosen(short=200, long=2000)):
+    for number in range(chosen(short=60, long=2000)):
         with VideoWriter(tmp_path / f"{number}.mp4", fps=30) as video:
             for each in pictures:
                 video.add(each, 1)

@@ -7,7 +7,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from tests.recordings.datasets.drives import INPUTS, JOINTS, config, drive, picture, task, written
+from tests.recordings.datasets.drives import INPUTS, config, drive, picture, task, written
 
 pytest.importorskip("lerobot")
 # What others warn of is theirs.
@@ -46,16 +46,6 @@ def shown(tensor) -> np.ndarray:
     return tensor.numpy().transpose(1, 2, 0) * 255
 
 
-def test_it_has_all_frames_of_two_episodes(load):
-    dataset = load()
-    assert (len(dataset), dataset.num_episodes, dataset.fps) == (29, 2, 10)
-    assert dataset.meta.camera_keys == [FRONT, WRIST]
-    assert dataset.features["observation.state"]["names"] == [
-        *(f"{joint}.position" for joint in JOINTS),
-        "twist.angular.z",
-    ]
-
-
 def test_every_item_has_the_values_and_pictures_of_its_messages(load):
     dataset = load()
     for number, stamp in enumerate(STAMPS):
@@ -78,13 +68,6 @@ def test_windows_of_time_reach_to_the_ends_of_an_episode(load):
     last = dataset[19]
     assert last["action_is_pad"].tolist() == [False, True, True]
     assert [action[0].item() for action in last["action"]] == pytest.approx([19, 19, 19])
-
-
-def test_one_episode_can_be_asked_for(load):
-    dataset = load(episodes=[1])
-    assert len(dataset) == 9
-    assert dataset[0]["action"][0].item() == pytest.approx(0.5)
-    assert np.abs(shown(dataset[8][FRONT]) - picture(850)).mean() < 2.5
 
 
 def test_single_values_single_frames_and_tasks_of_a_topic_are_read(load, tmp_path):
@@ -111,14 +94,6 @@ def test_single_values_single_frames_and_tasks_of_a_topic_are_read(load, tmp_pat
     assert dataset[len(dataset) - 1]["action"].shape in ((), (1,))
     assert dataset.meta.stats["action"]["mean"].shape == (1,)
     assert len(load(tmp_path / "dataset", delta_timestamps={"action": [0.0, 0.1]})[0]["action"]) == 2
-
-
-def test_a_data_loader_makes_batches(load):
-    from torch.utils.data import DataLoader  # noqa: PLC0415  as above
-
-    batch = next(iter(DataLoader(load(), batch_size=29)))
-    assert batch[FRONT].shape == (29, 3, 48, 64)
-    assert batch["action"].shape == (29, 3)
 
 
 def test_its_statistics_are_those_that_lerobot_computes(load, root):

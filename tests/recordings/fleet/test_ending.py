@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.command import ROOT
-from tests.faults.extent import IS_LONG
+from tests.faults.extent import chosen
 from tests.recordings.fleet.fleets import FILE, LEDGER, entries, make_fleet, replay_into, tree
 from tests.recordings.fleet.tasks import OBEDIENT, attempts_of
 from tests.ros.processes import children_of, wait_until
@@ -21,7 +21,7 @@ from tests.ros.processes import children_of, wait_until
 pytestmark = pytest.mark.process
 
 _DEADLINE_S = 60
-_KILLS = 50 if IS_LONG else 6
+_KILLS = chosen(short=6, long=50)
 ENVIRON = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONSAFEPATH": "1"}
 
 
@@ -57,22 +57,15 @@ def at_work(folder):
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_it_in_order(number, code, tmp_path):
     with at_work(tmp_path) as (command, workers):
-        command.send_signal(number)
+        # Ctrl-C of a terminal reaches the workers too.
+        for pid in (*(workers if number == signal.SIGINT else ()), command.pid):
+            os.kill(pid, number)
         output, told = command.communicate(timeout=_DEADLINE_S)
     assert (command.returncode, output) == (code, "")
     assert f"ended by {number.name}: 4 recordings: 2 done, 2 not done; the same command does the rest" in told
     assert not any(map(is_alive, workers))
     assert not (tmp_path / "out" / ".partial").exists()
     assert set(entries(tmp_path / "out")) == {"a", "b"}
-
-
-def test_ctrl_c_of_a_terminal_which_reaches_the_workers_too_is_one_request(tmp_path):
-    with at_work(tmp_path) as (command, workers):
-        for pid in (*workers, command.pid):
-            os.kill(pid, signal.SIGINT)
-        _, told = command.communicate(timeout=_DEADLINE_S)
-    assert command.returncode == 130
-    assert "2 done, 2 not done" in told
 
 
 def test_no_worker_outlives_a_command_that_is_killed(tmp_path):

@@ -19,7 +19,7 @@ from tests.faults.extent import chosen
 from tests.recordings.bag.making import write_mcap
 from tests.ros.streams import at, jittery, merged
 
-DRAWN: Final = chosen(short=60, long=2_000)
+DRAWN: Final = chosen(short=30, long=2_000)
 VECTOR: Final = "geometry_msgs/msg/Vector3Stamped"
 BASE: Final[dict[str, Any]] = {
     "version": 1,

@@ -11,7 +11,7 @@ from threading import Thread
 import pytest
 
 from tests.cli.command import run, run_python
-from tests.recordings.bag.making import rig, write_mcap, write_ros1, write_rosbag2
+from tests.recordings.bag.making import rig, write_mcap, write_rosbag2
 from tests.recordings.bag.test_storage import rig_with_images
 from tests.ros.cdr_messages import VECTOR
 
@@ -127,23 +127,6 @@ def test_of_a_recording_with_images_a_small_part_is_fetched_and_the_sets_are_the
     assert "copied" not in said
 
 
-@pytest.mark.parametrize("kind", ["db3", "bag", "folder"])
-def test_the_sets_of_what_is_copied_here_are_the_same(kind, folder, relay):  # noqa: ARG001  the bucket
-    frames = rig(20)
-    if kind == "bag":
-        path = name = write_ros1(folder / "rig.bag", frames)
-        put(path, "day")
-    else:
-        path = write_rosbag2(folder / "rig", frames)
-        put(path, "day/rig")
-        name = next(path.glob("*.db3")) if kind == "db3" else path
-    far, said = sets_of(f"s3://fleet/day/{name.relative_to(folder)}", folder)
-    near, _ = sets_of(str(name), folder)
-    assert far == near
-    assert len(far) == 19
-    assert "copied here as a whole" in said
-
-
 @pytest.mark.parametrize(
     ("word", "why"),
     [
@@ -194,33 +177,6 @@ def test_recordings_are_found_below_folders_and_by_patterns(folder, relay):  # n
     }
     done = run_python("-c", _FOUND, *found, folder=folder)
     assert [line.split() for line in done.stdout.splitlines()] == list(found.values()), done.stderr
-
-
-@pytest.mark.parametrize("command", [["export", "--output", "out"], ["replay", "--into", "out"]])
-def test_many_are_done_by_workers_once_and_again_only_when_they_change(command, folder, relay):  # noqa: ARG001
-    below = f"many_{command[0]}"
-    for name in ("a", "b"):
-        write_mcap(folder / f"{name}.mcap", rig())
-        put(folder / f"{name}.mcap", below)
-    words = [command[0], f"s3://fleet/{below}/*.mcap", "--config", "f.yaml", *command[1:], "--jobs", "2"]
-    done = run(*words, folder=folder)
-    assert (done.returncode, done.stdout) == (0, "out: 2 recordings: 2 done\n"), done.stderr
-    ours = run(command[0], "a.mcap", "b.mcap", "--config", "f.yaml", command[1], "here", folder=folder)
-    assert ours.returncode == 0
-    counts = [
-        [
-            entry["facts"]["groups"]
-            for entry in map(json.loads, (folder / into / "_ledger.jsonl").read_text().splitlines()[1:])
-        ]
-        for into in ("out", "here")
-    ]
-    assert counts[0] == counts[1]
-    assert counts[0][0][0]["sets"] > 30
-    assert run(*words, folder=folder).stdout == "out: 2 recordings: 2 done before\n"
-    write_mcap(folder / "b.mcap", rig(20))
-    put(folder / "b.mcap", below)
-    assert run(*words, folder=folder).stdout == "out: 2 recordings: 1 done, 1 done before\n"
-    assert _KEY not in (folder / "out" / "_ledger.jsonl").read_text()
 
 
 _ROWS = """

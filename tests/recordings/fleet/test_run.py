@@ -57,7 +57,7 @@ _KINDS: Final[dict[str, tuple[type, str, int]]] = {
     "grow": (Failed, "was changed while it was read: is it still being recorded?", 1),
 }
 _CHANGES: Final = ("nothing", "nothing", "content", "content", "new", "removed", "damaged", "added", "folder")
-_DRAWN: Final = chosen(short=6, long=200)
+_DRAWN: Final = chosen(short=2, long=200)
 
 
 class Drawn:
