@@ -3,12 +3,13 @@
 from bisect import bisect_right
 from itertools import product
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.config import Distance
-from syncrelay.explain.nearest import NearestSpans
+from syncrelay.explain.nearest import NearestSpans, signed_distances
 
 STAMPS = st.lists(st.integers(0, 60), min_size=1, max_size=7, unique=True).map(sorted)
 STREAMS = st.lists(STAMPS, min_size=2, max_size=4)
@@ -64,6 +65,13 @@ def test_it_is_what_a_search_through_all_sets_finds_in_whatever_chunks_the_stamp
     nearest = NearestSpans(len(streams), distance)
     chunks = cases.draw(chunked(streams))
     assert [span for chunk in chunks for span in nearest.add(chunk, pivot=pivot)] == reference(streams, pivot)
+
+
+@given(stamps=STAMPS, others=STAMPS)
+def test_the_distance_to_the_nearest_of_others_is_known_of_what_lies_among_them(stamps, others):
+    among = [stamp for stamp in stamps if others[0] < stamp <= others[-1]]
+    nearest = [min((other - stamp for other in others), key=lambda by: (abs(by), by)) for stamp in among]
+    assert signed_distances(np.array(stamps), np.array(others)).tolist() == nearest
 
 
 def test_a_message_is_measured_once_something_on_every_input_is_not_older():
