@@ -9,8 +9,8 @@ from syncrelay.runtime import SYSTEM, Runtime
 
 # What was lost, and what had to wait, is reported for the last ten evaluations.
 _RECENT: Final = 10
-# So many evaluations after a publisher was found, its first messages have arrived: it may find the subscription only with
-# the next announcement, 3 s later, and what its history has dropped by then counts as lost.
+# So many evaluations after a publisher was found, its first messages have arrived: it may find the subscription only
+# with the next announcement, 3 s later, and what its history has dropped by then counts as lost.
 _SETTLING: Final = 5
 # Fast DDS announces a node every 3 s, and what it publishes is known some tenths of a second later.
 _UNCHANGED_S: Final = 4.0
