@@ -91,5 +91,6 @@ def test_every_set_is_a_row_and_every_message_is_decoded(name, real_data):
                 for row in rows_of(table.select(["stamps", "left_at", "latency_ns"]))
             ]
     assert rows == told
-    assert sum(map(len, rows.values()))
+    assert rows
+    assert min(map(len, rows.values())) > 90
     assert sets.faults() == []
