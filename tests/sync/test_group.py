@@ -1,6 +1,5 @@
-"""What all policies share, drawn: lateness, waits, optional inputs, thinning. test_reference_group.py has the rest."""
+"""What a group counts and refuses; test_reference_group.py has what it does."""
 
-from functools import partial
 from typing import Any, assert_type
 
 import pytest
@@ -9,7 +8,6 @@ from syncrelay.sync import (
     ApproximateTime,
     Drop,
     DropReason,
-    EqualKey,
     ExactTime,
     InputCounts,
     LatestTime,
@@ -18,7 +16,7 @@ from syncrelay.sync import (
     Restamp,
     SyncGroup,
 )
-from tests.sync.support.timeline import START_NS, TICK_NS, drawn_cases, stamp
+from tests.sync.support.timeline import START_NS, TICK_NS, stamp
 
 
 def grouped(policy, *, optional=(), max_wait=None, period=None, **options):
@@ -31,94 +29,12 @@ def grouped(policy, *, optional=(), max_wait=None, period=None, **options):
     )
 
 
-def exact(inputs=2, **options):
-    return grouped(ExactTime(n_inputs=inputs, queue_size=10), **options)
+def exact(**options):
+    return grouped(ExactTime(n_inputs=2, queue_size=10), **options)
 
 
-def approximate(inputs=2, queue=10, slop=4, **options):
-    return grouped(ApproximateTime(n_inputs=inputs, queue_size=queue, slop_ns=slop * TICK_NS), **options)
-
-
-def by_key(inputs=2, **options):
-    return grouped(EqualKey(n_inputs=inputs, queue_size=3), **options)
-
-
-def latest(max_age=None, **options):
-    ages = [None if max_age is None else max_age * TICK_NS] * 2
-    return grouped(LatestTime(n_inputs=2, queue_size=9, trigger=0, max_ages_ns=ages), **options)
-
-
-GAP = "." * 101
-"""More than a second."""
-
-test_drawn = drawn_cases(
-    {
-        "older than what its input last gave is late, and so is as old": (
-            exact,
-            """
-            left  |a.b.
-            left  |..c.
-            right |..B.
-            arrive: B b a c
-            -> b: bB
-            -> a: a late
-            -> c: c late
-            """,
-        ),
-        "a stamp that falls by more than a second flushes the group, also what others still send of the time before": (
-            exact,
-            f"""
-            left  |d.{GAP}ab.
-            right |D.{GAP}A.B
-            arrive: a A b d B D
-            -> A: aA
-            -> d: b time_jump
-            -> B: B time_jump
-            -> D: dD
-            """,
-        ),
-        "the best set so far leaves max_wait after it was complete": (
-            partial(approximate, max_wait=3),
-            """
-            lidar  |a........b
-            camera |.A.......B...
-            -> @4: aA
-            -> B: bB
-            """,
-        ),
-        "a set takes the optional message nearest to its middle, as soon as none can be nearer": (
-            partial(approximate, 3, optional=(2,), max_wait=5),
-            """
-            lidar  |....b....
-            camera |....B....
-            imu    |..v..w...
-            -> w: v superseded, bBw
-            """,
-        ),
-        "periods are counted from the first set, so what passes is spread evenly": (
-            partial(exact, period=4),
-            """
-            left  |.a..b..c..d..e..
-            right |.A..B..C..D..E..
-            -> A: aA
-            -> B: bB
-            -> C: c thinned, C thinned
-            -> D: dD
-            -> E: eE
-            """,
-        ),
-        "a message that serves many sets is thinned when it can be in none that passes": (
-            partial(latest, every=3),
-            """
-            lidar |.a.b.c.d.e
-            odom  |A.B.C.D.E.
-            -> a: aA
-            -> c: b thinned, B thinned
-            -> d: c thinned, C thinned, dD
-            """,
-        ),
-    }
-)
+def approximate(inputs=2, **options):
+    return grouped(ApproximateTime(n_inputs=inputs, queue_size=5, slop_ns=TICK_NS), **options)
 
 
 def test_counts_say_where_every_message_went():
@@ -137,7 +53,7 @@ def test_counts_say_where_every_message_went():
 
 @pytest.mark.parametrize("options", [{}, {"max_wait": 5}, {"inputs": 3, "optional": (0,), "max_wait": 5}])
 def test_counts_tell_the_queue_that_was_needed(options):
-    group = approximate(queue=5, slop=1, **options)
+    group = approximate(**options)
     for column in range(20):
         group.add(Message(1, stamp(column), None), now=0)
     other = 2 if "inputs" in options else 0
@@ -146,7 +62,8 @@ def test_counts_tell_the_queue_that_was_needed(options):
 
 
 def test_what_passed_before_a_flush_is_counted_again_after_it():
-    group = latest(period=1)
+    policy = LatestTime(n_inputs=2, queue_size=9, trigger=0, max_ages_ns=[None] * 2)
+    group = grouped(policy, period=1)
     for _ in range(2):
         group.add(Message(1, stamp(0), "A"), now=0)
         (match,) = group.add(Message(0, stamp(1), "a"), now=0)

@@ -16,10 +16,12 @@ from tests.sync.support.rigs import (
     START,
     TICK,
     Options,
+    Tally,
     few,
     finish,
     make_group,
     make_policy,
+    members,
     options,
     run,
     steps,
@@ -47,31 +49,8 @@ def sets_of(outcomes):
     return [outcome for outcome in outcomes if isinstance(outcome, Match)]
 
 
-def members(match):
-    return [message for message in match.messages if message is not None]
-
-
 def flat(left):
     return [outcome for outcomes in left for outcome in outcomes]
-
-
-class Tally:
-    """Counts from outside, by each message's own fate."""
-
-    def __init__(self, n_inputs):
-        self.fed: Counter[int] = Counter()
-        self.matched: list[set] = [set() for _ in range(n_inputs)]
-        self.dropped: list[Counter[DropReason]] = [Counter() for _ in range(n_inputs)]
-
-    def note(self, step, outcomes):
-        if step.message is not None:
-            self.fed[step.message.input] += 1
-        for outcome in outcomes:
-            if isinstance(outcome, Match):
-                for message in members(outcome):
-                    self.matched[message.input].add(message.payload)
-            else:
-                self.dropped[outcome.message.input][outcome.reason] += 1
 
 
 @also_by_clock
@@ -81,11 +60,9 @@ def test_fed_is_matched_and_dropped_and_buffered_at_any_moment(policy, rig):
     group = make_group(policy, chosen)
     tally = Tally(chosen.n_inputs)
     for step in taken:
-        tally.note(step, take(group, step))
-        for index, counts in enumerate(group.counts()):
-            assert counts.fed == tally.fed[index]
-            assert counts.matched == len(tally.matched[index])
-            assert counts.dropped == tally.dropped[index]
+        tally.note(step.message, take(group, step))
+        assert tally.agrees(group)
+        for counts in group.counts():
             assert counts.fed == counts.matched + sum(counts.dropped.values()) + counts.buffered
     left = group.flush(DropReason.SHUTDOWN)
     assert all(drop.reason is DropReason.SHUTDOWN for drop in left)

@@ -8,7 +8,7 @@ import pytest
 from syncrelay.sync import DropReason, Match, Message, Restamp
 from tests.faults.extent import chosen
 from tests.sync.support.reference_group import ByKey, ByStamp, ReferenceGroup
-from tests.sync.support.rigs import BY_CLOCK, POLICIES, START, TICK, Options, make_group, make_policy
+from tests.sync.support.rigs import BY_CLOCK, POLICIES, START, TICK, Options, Tally, make_group, make_policy
 
 GROUPS = chosen(short=200, long=2_000)
 LAGS = (0,) * 8 + (1, 1, 2, 3, 5, 8, 13, 99, 100, 101, 102, 250)
@@ -92,12 +92,14 @@ def test_a_group_does_what_the_slow_one_does(policy):
     for seed in range(GROUPS):
         rng = random.Random(seed)
         options = drawn(rng, policy)
-        group, slow = make_group(policy, options), reference(policy, options)
+        group, slow, tally = make_group(policy, options), reference(policy, options), Tally(options.n_inputs)
         for number, (call, arguments, at) in enumerate(steps(rng, options.n_inputs)):
             outcomes = getattr(group, call)(*arguments, **at)
             case = f"seed {seed}, step {number}, {options}"
             assert told(outcomes) == told(getattr(slow, call)(*arguments, **at)), case
             assert group.next_deadline() == slow.next_deadline(), case
+            tally.note(arguments[0] if call == "add" else None, outcomes)
+            assert tally.agrees(group), case
             left.update("set" if isinstance(each, Match) else each.reason for each in outcomes)
     assert left["set"] > GROUPS, "too few sets to prove anything"
     assert all(left[reason] for reason in (DropReason.LATE, DropReason.TIME_JUMP, DropReason.THINNED)), left

@@ -3,6 +3,7 @@
 The policies are made from their models, as those of a file are: one that is added there is tested here.
 """
 
+from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -14,7 +15,7 @@ from syncrelay.config.models import Inputs
 from syncrelay.config.policies import GROUP_MODELS
 from syncrelay.config.sections import NodeConfig
 from syncrelay.config.units import parse_duration
-from syncrelay.sync import DropReason, LatestAtTicks, Message, Restamp, SyncGroup, Ticks
+from syncrelay.sync import DropReason, LatestAtTicks, Match, Message, Restamp, SyncGroup, Ticks
 
 TICK = 10_000_000
 START = 10**12
@@ -179,3 +180,30 @@ def run(group, taken):
 def finish(group, taken):
     """What leaves step by step, and at the end by a flush."""
     return [*run(group, taken), list(group.flush(DropReason.SHUTDOWN))]
+
+
+def members(match):
+    return [message for message in match.messages if message is not None]
+
+
+class Tally:
+    """Counts from outside, by each message's own fate."""
+
+    def __init__(self, n_inputs):
+        self.fed = [0] * n_inputs
+        self.matched: list[set] = [set() for _ in range(n_inputs)]
+        self.dropped: list[Counter[DropReason]] = [Counter() for _ in range(n_inputs)]
+
+    def note(self, message, outcomes):
+        if message is not None:
+            self.fed[message.input] += 1
+        for outcome in outcomes:
+            if isinstance(outcome, Match):
+                for each in members(outcome):
+                    self.matched[each.input].add(each.payload)
+            else:
+                self.dropped[outcome.message.input][outcome.reason] += 1
+
+    def agrees(self, group):
+        told = [(counts.fed, counts.matched, counts.dropped) for counts in group.counts()]
+        return told == list(zip(self.fed, map(len, self.matched), self.dropped, strict=True))

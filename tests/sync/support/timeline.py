@@ -1,14 +1,12 @@
-"""Drawn cases for policies and groups; see syncrelay.recordings.cases.drawing for what is drawn how.
+"""Plays what is drawn; see syncrelay.recordings.cases.drawing for what is drawn how.
 
 A column is a tick of 10 ms.
 """
 
 from dataclasses import dataclass, replace
 
-import pytest
-
 from syncrelay.recordings.cases.drawing import parse as parse_drawing
-from syncrelay.sync import Drop, Match, Message, SyncGroup
+from syncrelay.sync import Drop, Match, Message
 
 TICK_NS = 10_000_000
 START_NS = 5_000_000_000
@@ -52,7 +50,7 @@ def told(outcome):
     return f"{outcome.message.payload} {outcome.reason.value}"
 
 
-def play_group(group, drawing, raw_stamp=lambda message: message.stamp):
+def play_group(group, drawing):
     """Feed the drawing to a group whose driver meets every deadline: (what left, what was drawn to leave)."""
     timeline = parse(drawing)
     lines = []
@@ -67,17 +65,5 @@ def play_group(group, drawing, raw_stamp=lambda message: message.stamp):
             note(f"@{column}", group.expire(now=stamp(column)))
         while arrivals and arrivals[0][0] == column:
             message = arrivals.pop(0)[1]
-            note(message.payload, group.add(replace(message, stamp=raw_stamp(message)), now=stamp(column)))
+            note(message.payload, group.add(message, now=stamp(column)))
     return tuple(lines), timeline.expected
-
-
-def drawn_cases(cases):
-    """`cases`: a sentence -> (a function that makes a policy or a group, a drawing)."""
-
-    @pytest.mark.parametrize(("make", "drawing"), cases.values(), ids=cases)
-    def test(make, drawing):
-        made = make()
-        left, drawn = play_group(made if isinstance(made, SyncGroup) else SyncGroup(made), drawing)
-        assert left == drawn
-
-    return test
