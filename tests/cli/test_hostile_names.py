@@ -29,7 +29,7 @@ from tests.top import states
 from tests.top.speaker import answering, speaking
 from tests.top.terminal import Terminal
 
-pytestmark = pytest.mark.parametrize("seed", range(chosen(short=1, long=20)))
+pytestmark = [pytest.mark.faults, pytest.mark.parametrize("seed", range(chosen(short=1, long=20)))]
 _GOOD = ("/camera", "/lidar")
 
 

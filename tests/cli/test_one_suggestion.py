@@ -87,6 +87,7 @@ def _named(text: str) -> set[tuple[str, str, str]]:
     return {(key, topic, value) for key, value, topic in _VALUE.findall(text)}
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("seed", range(_DRAWN))
 def test_every_view_of_a_recording_names_one_value_and_it_gives_the_sets_of_one_moment(seed, tmp_path):
     drawn = Drawn(seed)

@@ -80,6 +80,7 @@ sys.exit(main())
 """
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("inherited", ["SIG_DFL", "SIG_IGN"])
 @pytest.mark.parametrize("after_s", chosen(short=[0.08], long=[0.0, 0.03, 0.08, 0.2, 0.6]))
 def test_it_ends_with_its_terminal_however_soon_that_goes(tmp_path, after_s, inherited):

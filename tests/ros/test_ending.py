@@ -29,6 +29,7 @@ _MOMENTS_S = [0.0, *(_CHANCE.uniform(0, 2.5) for _ in range(chosen(short=2, long
 _SIGNALS = itertools.cycle([signal.SIGTERM, signal.SIGINT])
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize(
     ("number", "moment_s"),
     [

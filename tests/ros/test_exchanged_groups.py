@@ -195,6 +195,7 @@ def _any_groups(chance: random.Random) -> dict[str, list[tuple[str, str, str]]]:
     return groups
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("seed", range(chosen(short=2, long=20)))
 def test_any_groups_take_the_place_of_any_others_or_leave_them_as_they_were(here, seed: int):
     """The entities of the node are those of the groups that run, whatever their topics were before as which types."""

@@ -15,7 +15,7 @@ from tests.ros.configs import LOSSLESS, ROOMY, config, inputs, outputs
 from tests.ros.frames import Frame
 from tests.ros.stage import BACKEND, BACKENDS, Stage
 
-pytestmark = [pytest.mark.ros, pytest.mark.real_data]
+pytestmark = [pytest.mark.ros, pytest.mark.real_data, pytest.mark.faults]
 
 _MS = 1_000_000
 
