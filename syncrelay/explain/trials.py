@@ -353,7 +353,7 @@ class Trials:
             shift = whole - middle if is_whole else -middle
             # Of two, the one that is farther from this machine's time is odd.
             at, shift = (index, shift) if abs(delays[0]) >= abs(delays[1]) else (pivot, -shift)
-            is_same_rate = abs(float(np.median(np.diff(one))) / period - 1) <= _SAME_RATE if len(one) > 1 else False
+            is_same_rate = abs(float(np.median(np.diff(one))) / period - 1) <= _SAME_RATE
             if (change := offset_change(at, round(self.config.topics[at].offset_ns + shift))) is not None:
                 yield change, is_whole and is_same_rate
 
