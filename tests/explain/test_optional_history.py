@@ -14,7 +14,8 @@ from tests.faults.extent import chosen
 _SLOP_S = 0.02
 _HZ = 10
 _LASTS_S = 40
-_SEEDS = range(chosen(short=15, long=40))
+# All causes are named at these, but for an input that never came.
+_SEEDS = chosen(short=[3, 9, 14], long=[*range(40)])
 
 
 @dataclass
