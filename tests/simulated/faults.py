@@ -486,5 +486,5 @@ def returns_silent(world: World, target: str, seconds: float) -> End:
     driver = world.drivers[target]
     driver.leave()
     end = _set(world, target, is_silent=True)
-    world.scheduler.after(round(seconds / 3 * SECOND), driver.start)
+    world.scheduler.after(round(seconds / 4 * SECOND), driver.start)
     return end
