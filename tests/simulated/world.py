@@ -27,6 +27,14 @@ _SENDS_NOTHING_NEW: Final = frozenset({"status", "reload", "pause", "deactivate"
 _FIRST: Final = 900 * SECOND
 
 
+class _Span(NamedTuple):
+    """How far the rig's clock is ahead of the monotonic one from a time on, and when it came to rest."""
+
+    since: int
+    offset: int
+    until: int = 1 << 62
+
+
 class Line(NamedTuple):
     """A line of the relay's log."""
 
@@ -206,7 +214,7 @@ class World:
         self.scheduler = Scheduler(plan.seed, eagerness=plan.eagerness, lag_ns=round(plan.lag_ms * MS))
         self.began = self.scheduler.now
         self.clock_offset = self.scheduler.process.clock_offset
-        self._rig_clock = [(0, -self.began if plan.by_sim_time else self.clock_offset)]
+        self._rig_clock = [_Span(0, -self.began if plan.by_sim_time else self.clock_offset)]
         self.sim_stopped: int | None = None
         self.still_since: float | None = None
         """Since when the relay must send nothing: it has said that it is paused, or deactivated."""
@@ -252,17 +260,17 @@ class World:
 
     def stamp_at(self, when: int) -> int:
         """What the rig's clock shows at a monotonic time."""
-        if self.sim_stopped is not None:
-            when = min(when, self.sim_stopped)
-        return when + next(offset for since, offset in reversed(self._rig_clock) if since <= when)
+        now = next(each for each in reversed(self._rig_clock) if each.since <= when)
+        return min(when, now.until) + now.offset
 
     def shift_rig_clock(self, by: int) -> None:
         """Set the clock that stamps all messages."""
-        self._rig_clock.append((self.scheduler.now, self._rig_clock[-1][1] + by))
+        self._rig_clock.append(_Span(self.scheduler.now, self._rig_clock[-1].offset + by))
 
     def stop_rig_clock(self) -> None:
         """Have it rest."""
         self.sim_stopped = self.scheduler.now
+        self._rig_clock[-1] = self._rig_clock[-1]._replace(until=self.sim_stopped)
 
     def go_on_with_rig_clock(self) -> None:
         """Have it go on where it rested."""
