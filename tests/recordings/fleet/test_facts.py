@@ -29,7 +29,7 @@ from tests.ros.streams import at, merged
 pytestmark = pytest.mark.process
 
 _SEED = 29
-_DRAWN = 30
+_DRAWN = 18
 _LASTS_S = 8
 _DAYS = ("2023-11-14", "2023-11-15", "2023-11-16")
 _QUERIES = re.findall(r"```sql\n(.*?)```", (ROOT / "docs" / "howto" / "fleet_report.md").read_text(), re.DOTALL)

@@ -94,14 +94,10 @@ def test_another_file_of_its_name_is_refused(text, out):
     assert (out / LEDGER).read_text() == text
 
 
-def test_a_folder_that_holds_something_else_is_refused(tmp_path):
-    (tmp_path / "thesis.tex").write_text("")
+def test_a_folder_of_other_files_and_a_file_in_its_place_are_refused(tmp_path):
+    (tmp_path / "out").write_text("")
     with pytest.raises(SyncRelayError, match=r"holds files and no _ledger\.jsonl: name an empty folder"):
         Ledger(tmp_path)
-
-
-def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
-    (tmp_path / "out").write_text("")
     with pytest.raises(SyncRelayError, match=r"out: cannot be written: File exists"):
         Ledger(tmp_path / "out")
 
