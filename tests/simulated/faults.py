@@ -191,8 +191,8 @@ def twice(world: World, target: str, _: float) -> End:
     return _set(world, target, is_twice=True)
 
 
-# Delays that grow and fall with each batch, or as what was lost is sent again, look like a drift where few messages make
-# one: its clock is to be modelled.
+# Delays that grow and fall with each batch, or as what was lost is sent again, look like a drift where few messages
+# make one: its clock is to be modelled.
 @_kind("sensor", names="bursts short_queue silent slowed waiting_for_optional few_sets out_of_order clock_drift")
 def batches(world: World, target: str, _: float) -> End:
     """Messages are held back, and sent together."""
