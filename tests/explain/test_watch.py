@@ -99,7 +99,9 @@ def test_what_came_before_this_machines_clock_was_set_forward_is_forgotten():
     made, nothing = watch(slop="20ms"), InputCounts(0, 0, {}, 0)
     made.add([[(BEGAN, BEGAN)]] * 2, [], [nothing] * 2, 0, now=BEGAN + S)
     now = BEGAN + 3600 * S
-    made.add([[(BEGAN, BEGAN + S), (now, now - MS)]] * 2, [], [nothing] * 2, 0, clock_set=Step(now, 3599 * S), now=now)
-    found = made.facts(GRAPH, now=now)
+    # The clock was set once, however often that is said.
+    for came, at in (([(BEGAN, BEGAN + S), (now, now - MS)], now), ([], now + S)):
+        made.add([came] * 2, [], [nothing] * 2, 0, clock_set=Step(now, 3599 * S), now=at)
+    found = made.facts(GRAPH, now=now + S)
     assert [list(each.figures.received) for each in found.inputs] == [[now - MS]] * 2
     assert found.figures.began == now
