@@ -126,7 +126,7 @@ class Driver:
         number = self._number
         self._number += 1
         self._plan_next(life)
-        if self.is_silent or (self.is_halved and number % 2):
+        if self.is_silent or (self.is_halved and number % 2) or self.world.rested_at(at):
             return
         # What is under way as the rig's clock jumps was sampled before.
         stamp = self.world.stamp_at(at)
@@ -260,8 +260,15 @@ class World:
 
     def stamp_at(self, when: int) -> int:
         """What the rig's clock shows at a monotonic time."""
-        now = next(each for each in reversed(self._rig_clock) if each.since <= when)
+        now = self._span_of(when)
         return min(when, now.until) + now.offset
+
+    def rested_at(self, when: int) -> bool:
+        """Whether that clock stood still: nothing was sampled then."""
+        return when > self._span_of(when).until
+
+    def _span_of(self, when: int) -> _Span:
+        return next(each for each in reversed(self._rig_clock) if each.since <= when)
 
     def shift_rig_clock(self, by: int) -> None:
         """Set the clock that stamps all messages."""
