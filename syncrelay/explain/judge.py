@@ -122,7 +122,9 @@ EXPLAINS: Final[Mapping[Code, _Explained]] = {
     Code.OTHER_CLOCK: _Explained(MATCHING),
     Code.SLOWED: _Explained(MATCHING),
     Code.BURSTS: _Explained(frozenset({Code.SHORT_QUEUE, Code.FEW_SETS, Code.UNEXPLAINED})),
-    Code.MESSAGES_LOST: _Explained(frozenset({Code.FEW_SETS, Code.UNEXPLAINED}), frozenset({Code.BURSTS})),
+    Code.MESSAGES_LOST: _Explained(
+        frozenset({Code.OVER_SLOP, Code.FEW_SETS, Code.UNEXPLAINED}), frozenset({Code.BURSTS})
+    ),
     Code.DUPLICATES: _Explained(frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET, Code.FEW_SETS, Code.UNEXPLAINED})),
 }
 """Causes, and which other findings they explain. No chain of explanations comes back to where it began."""
