@@ -252,10 +252,11 @@ class Judge:
     def _as_bad_as_it_stands(self, said: tuple[Finding, ...], facts: GroupFacts) -> tuple[Finding, ...]:
         """Return findings of which one is as bad as the share of sets that left: its cause, or that there are few."""
         least = Severity.ERROR if facts.standing is Standing.NONE else Severity.WARN
-        if any(finding.severity >= least for finding in said):
+        # What is too small to be the cause, or is none of this, leaves open why sets are missing.
+        told = [each for each in said if each.severity is not Severity.OK and _is_why(each)]
+        if any(each.severity >= least for each in told):
             return said
-        told = (each for each in said if each.severity is not Severity.OK)
-        cause = next((each for each in told if each.code in MATCHING or Code.FEW_SETS in explained_by(each.code)), None)
+        cause = next(iter(told), None)
         if cause is not None:
             return tuple(replace(each, severity=least) if each is cause else each for each in said)
         (few,) = _FEW_SETS.findings(facts)
@@ -267,7 +268,7 @@ class Judge:
             few = replace(cause, severity=least, text=text, suggestion=None, is_over=True)
         elif rules_stamps.may_drift(facts):
             few = replace(few, suggestion=_WAIT)
-        return (*said, few)
+        return (few, *said)
 
     def _root(self, finding: Finding, facts: GroupFacts) -> Finding:
         """Return the cause that explains a finding and that nothing explains, or the finding itself."""
@@ -276,6 +277,11 @@ class Judge:
             if _explains(cause, finding, facts):
                 return self._root(cause.finding, facts)
         return finding
+
+
+def _is_why(finding: Finding) -> bool:
+    """Whether a finding says why few sets leave."""
+    return finding.code in MATCHING or (finding.explains and Code.FEW_SETS in explained_by(finding.code))
 
 
 def judge(facts: GroupFacts) -> tuple[Finding, ...]:

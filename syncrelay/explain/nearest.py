@@ -247,7 +247,7 @@ def _disjoint(spans: Nanoseconds, partners: Sequence[Nanoseconds]) -> npt.NDArra
 class NearestSpans:
     """Measures the tightest set of each message of one input once, as soon as no later message can change it.
 
-    In plain Python: few messages come between two polls, for which arrays take four times as long.
+    In plain Python: of tens of messages between two polls arrays take twice as long and more, and of a thousand half.
     """
 
     def __init__(self, n_inputs: int, distance: Distance = Distance.SPAN) -> None:
@@ -296,6 +296,8 @@ def _side(others: Sequence[int], stamp: int) -> tuple[int, int]:
 
 def _tightest_span(sides: list[tuple[int, int]]) -> int:
     """Return the span of the tightest set around a message, of how far on both sides of it each partner may be."""
+    if len(sides) == 1:
+        return min(sides[0])
     sides.sort()
     lefts = [0, *(before for before, _ in sides)]
     # Those up to a place lie before the message, and all others after it.

@@ -12,9 +12,6 @@ _TOO_SLOW: Final = 500_000_000
 # An input too slow to send this many messages in the time of a burst cannot show one.
 _SHOWN_BY: Final = 5
 _PAUSE_PERIODS: Final = 3
-# Of as many sets as messages of the rarest input came: losses of most explain a silence, of some that sets are missing.
-_MOST_LOST: Final = 0.5
-_SOME_LOST: Final = 0.02
 # Reliable publishers send what the relay missed in a standstill again within this time.
 _SENT_AGAIN: Final = 4 * SECOND
 
@@ -59,15 +56,16 @@ def _overlap(held_up: Sequence[Sequence[tuple[int, int]]]) -> bool:
 
 
 def messages_lost(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
-    """Find messages that DDS itself lost before they came here. Each may have cost a set."""
-    required = [each for each in facts.inputs if each.required]
-    lost, possible = sum(each.graph.lost for each in required), min(each.figures.fed for each in required)
+    """Find messages that DDS itself lost before they came here."""
+    share = facts.figures.share
+    # Each cost a set at most: they are the cause where they account for most of those that are missing.
+    missing, cost = share.possible - share.left, sum(each.graph.lost for each in facts.inputs if each.required)
     if an_input.graph.lost:
         messages = "1 message" if an_input.graph.lost == 1 else f"{an_input.graph.lost} messages"
         yield Fault(
             f"DDS lost {messages} of {an_input.name} on the way here in the last 10 s",
             f"check the network and the CPU load; if {nodes(an_input)} is reliable, `qos: auto` makes it resend them",
-            explains=an_input.required and lost >= (_MOST_LOST if facts.is_silent else _SOME_LOST) * possible,
+            explains=an_input.required and 0 < missing <= 2 * cost,
         )
 
 

@@ -4,7 +4,6 @@ import os
 import re
 import signal
 import sys
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -89,8 +88,9 @@ def test_it_matches_a_simulated_rig_until_a_signal_ends_it_sums_up_and_leaves_no
             assert received == matched + unneeded + dropped
     assert groups["camera_lidar"][1] < 3  # the offset is in use: without it, 12
     assert re.search(r"offset: -12 ms on /demo/camera/image_raw: span .* 1[12](\.\d+)? ms without it", demo.stdout)
+    # A line a second, and no more.
     seconds = [float(each) for each in re.findall(r"^ +(\d+\.\d) s  camera_lidar", demo.stdout, re.MULTILINE)]
-    assert all(after - before > 0.8 for before, after in pairwise(seconds))
+    assert 0 < len(seconds) <= seconds[-1] + 1
     assert "\x1b" not in demo.stdout
     # Of what a busy machine makes of a rig, the relay may warn.
     assert [line for line in demo.said if not line.startswith("[WARN]")] == []

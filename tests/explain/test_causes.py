@@ -58,6 +58,21 @@ def test_sets_that_were_too_wide_a_while_ago_are_no_finding_while_those_of_now_a
     assert codes(judge(a_group(figures={**WIDE, "nearest_lately": Distribution([5 * MS] * 20)}))) == []
 
 
+@pytest.mark.parametrize(
+    ("lost", "possible", "found"),
+    [(1, 100, [Code.FEW_SETS, Code.MESSAGES_LOST]), (25, 100, [Code.MESSAGES_LOST]), (25, 20, [Code.MESSAGES_LOST])],
+)
+def test_losses_explain_what_is_missing_where_they_account_for_most_of_it(lost, possible, found):
+    share = {"share": Share(possible // 2, possible, 10 * S)}
+    few = judge(a_group(camera(lost=lost), LIDAR, figures=share, standing=Standing.FEW))
+    assert codes(few) == found
+    assert [each.severity for each in few] == [Severity.WARN] * len(found)
+    silent = judge(a_silent_group(camera(lost=lost), LIDAR, figures={"share": Share(0, possible // 2, 10 * S)}))
+    assert [each.code for each in silent if each.severity is Severity.ERROR] == [
+        Code.UNEXPLAINED if len(found) > 1 else Code.MESSAGES_LOST
+    ]
+
+
 def test_an_input_whose_messages_cannot_be_read_is_not_silent():
     unread = dropped(DropReason.MALFORMED, 70, **{**QUIET, "fed": 70})
     assert codes(judge(a_group(unread, LIDAR))) == [Code.MALFORMED]

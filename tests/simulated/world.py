@@ -27,12 +27,15 @@ _SENDS_NOTHING_NEW: Final = frozenset({"status", "reload", "pause", "deactivate"
 _FIRST: Final = 900 * SECOND
 
 
+_NEVER: Final = 1 << 62
+
+
 class _Span(NamedTuple):
     """How far the rig's clock is ahead of the monotonic one from a time on, and when it came to rest."""
 
     since: int
     offset: int
-    until: int = 1 << 62
+    until: int = _NEVER
 
 
 class Line(NamedTuple):
@@ -215,7 +218,6 @@ class World:
         self.began = self.scheduler.now
         self.clock_offset = self.scheduler.process.clock_offset
         self._rig_clock = [_Span(0, -self.began if plan.by_sim_time else self.clock_offset)]
-        self.sim_stopped: int | None = None
         self.still_since: float | None = None
         """Since when the relay must send nothing: it has said that it is paused, or deactivated."""
         self.random: Random = self.scheduler.stream("world")
@@ -272,18 +274,19 @@ class World:
 
     def shift_rig_clock(self, by: int) -> None:
         """Set the clock that stamps all messages."""
-        self._rig_clock.append(_Span(self.scheduler.now, self._rig_clock[-1].offset + by))
+        last = self._rig_clock[-1]
+        self._rig_clock.append(_Span(self.scheduler.now, last.offset + by, last.until))
 
     def stop_rig_clock(self) -> None:
         """Have it rest."""
-        self.sim_stopped = self.scheduler.now
-        self._rig_clock[-1] = self._rig_clock[-1]._replace(until=self.sim_stopped)
+        last = self._rig_clock[-1]
+        self._rig_clock[-1] = last._replace(until=min(last.until, self.scheduler.now))
 
     def go_on_with_rig_clock(self) -> None:
         """Have it go on where it rested."""
-        if self.sim_stopped is not None:
-            self.shift_rig_clock(self.sim_stopped - self.scheduler.now)
-            self.sim_stopped = None
+        now, last = self.scheduler.now, self._rig_clock[-1]
+        if last.until < _NEVER:
+            self._rig_clock.append(_Span(now, last.offset + last.until - now))
 
     def write_file(self, text: str | None = None) -> None:
         """Write the relay's file as it is to be now, or a text."""
@@ -322,7 +325,7 @@ class World:
 
         def tick() -> None:
             self.scheduler.after(_TICK, tick)
-            if self.sim_stopped is None:
+            if not self.rested_at(self.scheduler.now):
                 seconds, nanoseconds = divmod(max(0, self.stamp_at(self.scheduler.now)), SECOND)
                 writer.write(b"\0\1\0\0" + struct.pack("<iI", seconds, nanoseconds))
 
