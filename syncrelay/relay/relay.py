@@ -26,7 +26,8 @@ from syncrelay.relay.monitor import EVALUATE_S, Monitor
 from syncrelay.relay.ports import Node, Outcome, Purpose
 from syncrelay.relay.services import Offered, Services
 from syncrelay.relay.surroundings import Surroundings
-from syncrelay.runtime import SYSTEM, Running, Runtime
+from syncrelay.relay.threads import Threads
+from syncrelay.runtime import SYSTEM, Runtime
 from syncrelay.status import Phase, RelayState, Taps, advice
 from syncrelay.sync import DropReason
 
@@ -140,36 +141,21 @@ class Relay:
         self._next_evaluation = self._started + EVALUATE_S
         self._wake = runtime.rest()
         self._calls = Calls(self._wake.set, runtime=runtime)
-        self._threads: list[Running] = []
+        self._threads = Threads(runtime)
         self._serves = True
         self._services = Services(node, {}, bugs=self._bugs, runtime=runtime)
         self._receiving: Future[None] | None = None
 
     def __enter__(self) -> Self:
-        self._receiving = self._start("receive", self._loop.run)
+        self._receiving = self._threads.start("receive", self._loop.run)
         self._receiving.add_done_callback(lambda _: self._wake.set())
         if self._is_managed:
             self.forget_groups(Phase.UNCONFIGURED)
             _LOG.info("%s", self._advice)
-        self._start("serve", self._serve)
-        self._start("manifests", self._manifest_queue.run)
+        self._threads.start("serve", self._serve)
+        self._threads.start("manifests", self._manifest_queue.run)
         self._clock.follow(jumped_back=self._groups.clock_jumped_back, ticked=self._groups.clock_ticked)
         return self
-
-    def _start(self, name: str, target: Callable[[], None]) -> "Future[None]":
-        """Have a thread of its own call a function; how that ended comes in the future."""
-        ended: Future[None] = self._runtime.future()
-
-        def run() -> None:
-            try:
-                target()
-            except BaseException as error:  # noqa: BLE001  it is raised where the result is asked for
-                ended.set_exception(error)
-            else:
-                ended.set_result(None)
-
-        self._threads.append(self._runtime.start(f"syncrelay-{name}", run))
-        return ended
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -392,8 +378,7 @@ class Relay:
             self._manifest_queue.stop()
             self._serves = False
             self.node.end_serving()
-            for thread in self._threads:
-                thread.join()
+            self._threads.join()
             self._manifest_queue.keep(())
             self._loop.close()
             _LOG.removeHandler(self.node.log_handler)

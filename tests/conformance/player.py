@@ -5,8 +5,6 @@ import logging
 import re
 import struct
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -17,30 +15,14 @@ from syncrelay.explain.judge import explanation
 from syncrelay.relay.ports import EndpointInfo
 from syncrelay.relay.relay import Relay
 from tests.conformance.script import VECTOR, Script
+from tests.conformance.seen import MS, Seen, by_reason, endpoint, message, without_figures
 from tests.conformance.world import Reader, World, Writer
 from tests.ros.cdr_messages import vector
 from tests.simulated.running import Running
 
 _LOG: Final = logging.getLogger("syncrelay")
-_MS: Final = 1_000_000
 # Whether a node's name comes before its publishers; and what is said again and again where a script takes long.
 _BY_CHANCE: Final = re.compile("not known yet|no (more )?sets? for ")
-# In the sources of ROS.
-_PLACE: Final = re.compile(r", at [^ ,]+:\d+")
-# With its unit, which goes by the size of a duration.
-_NUMBER: Final = re.compile(r"\d+(\.\d+)?( (ns|us|ms|s)\b)?")
-
-
-@dataclass
-class Seen:
-    """What a user could see."""
-
-    outputs: dict[str, list[str]] = field(default_factory=dict)
-    """Of each subscriber: its messages, by time and frame."""
-    notes: list[Any] = field(default_factory=list)
-    """What was asked for, in the order of the script."""
-    log: list[str] = field(default_factory=list)
-    """The warnings and errors of the relay."""
 
 
 class _Running(Running):
@@ -149,7 +131,7 @@ class Player:
     def write(self, name: str, *stamps: float, frame: str = "", data: bytes | None = None) -> None:
         """A publisher publishes vectors with these stamps, or bytes."""
         for stamp in stamps:
-            content = vector(self._begin + round(stamp * _MS), frame_id=frame or name) if data is None else data
+            content = vector(self._begin + round(stamp * MS), frame_id=frame or name) if data is None else data
             self._writers[name][0].write(content)
 
     def absolute(self, name: str, *stamps: int) -> None:
@@ -243,7 +225,7 @@ class Player:
         def is_so() -> bool:
             inputs = self._inputs(name)
             noted[:] = [
-                (each.name, each.counts.fed, each.counts.matched, each.counts.buffered, _by_reason(each.counts.dropped))
+                (each.name, each.counts.fed, each.counts.matched, each.counts.buffered, by_reason(each.counts.dropped))
                 for each in inputs
             ]
             return bool(inputs) and buffered in (None, sum(each[3] for each in noted))
@@ -255,7 +237,7 @@ class Player:
         """So many messages of a group were dropped for a reason."""
 
         def is_so() -> bool:
-            return sum(_by_reason(each.counts.dropped).get(reason, 0) for each in self._inputs(name)) >= count
+            return sum(by_reason(each.counts.dropped).get(reason, 0) for each in self._inputs(name)) >= count
 
         self._until(is_so, f"{count} dropped as {reason}")
 
@@ -286,7 +268,7 @@ class Player:
 
         self._until(are_there, f"{publishers} publishers and {subscribers} subscribers of {topic}", found)
         told = [
-            sorted((_name(each) if named else "", each.type, *_unlike(each.profile)) for each in kind)
+            sorted(endpoint(each, named=named) for each in kind)
             for kind, number in zip(found(), wanted, strict=True)
             if number is not None
         ]
@@ -332,7 +314,7 @@ class Player:
                 "at the end",
                 report.facts.name,
                 [
-                    (each.name, each.counts.fed, each.counts.matched, _by_reason(each.counts.dropped))
+                    (each.name, each.counts.fed, each.counts.matched, by_reason(each.counts.dropped))
                     for each in report.facts.inputs
                 ],
             )
@@ -396,20 +378,11 @@ class Player:
     def _taken(self, name: str) -> int:
         reader, texts = self._readers[name], self.seen.outputs[name]
         while (content := reader.take()) is not None:
-            texts.append(self._told(content))
+            texts.append(message(content, self._begin))
         return len(texts)
 
-    def _told(self, content: bytes) -> str:
-        """Say which message this is."""
-        if len(content) < 20:
-            return content.hex()
-        stamp = int.from_bytes(content[4:8], "little", signed=True) * 10**9 + int.from_bytes(content[8:12], "little")
-        size = int.from_bytes(content[12:16], "little")
-        with suppress(UnicodeDecodeError):
-            offset = (stamp - self._begin) / _MS
-            when = f"{offset:.3f}" if abs(offset) < 86_400_000 else "other"
-            return f"{when} {content[16 : 16 + size - 1].decode()}"
-        return content[4:].hex()
+    def _blank(self, text: str) -> str:
+        return without_figures(text.replace(str(self._folder), "FOLDER"))
 
     def _forget(self, names: tuple[str, ...]) -> None:
         for name in names:
@@ -424,23 +397,6 @@ class Player:
 
     def _note(self, *words: Any) -> None:
         self.seen.notes.append(words)
-
-    def _blank(self, text: str) -> str:
-        return _NUMBER.sub("#", _PLACE.sub("", text.replace(str(self._folder), "FOLDER")))
-
-
-def _name(each: EndpointInfo) -> str:
-    return f"{each.node_namespace} {each.node_name}"
-
-
-def _unlike(profile: Profile) -> list[str]:
-    """Say in what a profile is unlike a usual one of the graph."""
-    usual = Profile(history="unknown", depth=0, liveliness="automatic")
-    return [f"{key}={value}" for key, value in asdict(profile).items() if value != getattr(usual, key)]
-
-
-def _by_reason(dropped: Mapping[Any, int]) -> dict[str, int]:
-    return {reason.value: count for reason, count in dropped.items() if count}
 
 
 def play(script: Script, world: World, folder: Path) -> Seen:

@@ -9,8 +9,9 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from syncrelay.config import GroupConfig
 from syncrelay.relay.groups import Groups
 from syncrelay.sync.group import SyncGroup
-from tests.conformance.player import Seen, play
+from tests.conformance.player import play
 from tests.conformance.script import PAIR, do, group, short
+from tests.conformance.seen import Seen
 from tests.conformance.simulated import SimulatedWorld
 
 _SENSORS = (do.publisher("/a"), do.publisher("/b"))

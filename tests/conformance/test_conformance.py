@@ -8,10 +8,11 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from tests.conformance.player import Seen, play
+from tests.conformance.player import play
 from tests.conformance.real import serve
 from tests.conformance.script import Script
 from tests.conformance.scripts import SCRIPTS
+from tests.conformance.seen import Seen
 from tests.conformance.simulated import SimulatedWorld
 from tests.faults.extent import IS_LONG
 

@@ -1,0 +1,58 @@
+"""What a user can see of a script, in words that are the same in every ROS."""
+
+import re
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from typing import Any, Final
+
+from syncrelay.config.profile import Profile
+from syncrelay.relay.ports import EndpointInfo
+
+MS: Final = 1_000_000
+# In the sources of ROS.
+_PLACE: Final = re.compile(r", at [^ ,]+:\d+")
+# With its unit, which goes by the size of a duration.
+_NUMBER: Final = re.compile(r"\d+(\.\d+)?( (ns|us|ms|s)\b)?")
+
+
+@dataclass
+class Seen:
+    """What a user could see."""
+
+    outputs: dict[str, list[str]] = field(default_factory=dict)
+    """Of each subscriber: its messages, by time and frame."""
+    notes: list[Any] = field(default_factory=list)
+    """What was asked for, in the order of the script."""
+    log: list[str] = field(default_factory=list)
+    """The warnings and errors of the relay."""
+
+
+def message(content: bytes, begin: int) -> str:
+    """Say which message this is, of a script that began then."""
+    if len(content) < 20:
+        return content.hex()
+    stamp = int.from_bytes(content[4:8], "little", signed=True) * 10**9 + int.from_bytes(content[8:12], "little")
+    size = int.from_bytes(content[12:16], "little")
+    with suppress(UnicodeDecodeError):
+        offset = (stamp - begin) / MS
+        when = f"{offset:.3f}" if abs(offset) < 86_400_000 else "other"
+        return f"{when} {content[16 : 16 + size - 1].decode()}"
+    return content[4:].hex()
+
+
+def without_figures(text: str) -> str:
+    """Leave numbers out, and places in the sources of ROS."""
+    return _NUMBER.sub("#", _PLACE.sub("", text))
+
+
+def endpoint(each: EndpointInfo, *, named: bool) -> tuple[str, ...]:
+    """Say of which node an endpoint is, of what type, and in what its profile is unlike a usual one of the graph."""
+    usual = Profile(history="unknown", depth=0, liveliness="automatic")
+    unlike = [f"{key}={value}" for key, value in asdict(each.profile).items() if value != getattr(usual, key)]
+    return (f"{each.node_namespace} {each.node_name}" if named else "", each.type, *unlike)
+
+
+def by_reason(dropped: Mapping[Any, int]) -> dict[str, int]:
+    """Leave out the reasons for which nothing was dropped."""
+    return {reason.value: count for reason, count in dropped.items() if count}
