@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 from typing import Any, Final
 
@@ -99,6 +100,33 @@ def test_choices_are_labels_that_there_are():
 def test_legends_name_labels_that_a_result_has():
     for _, target in _TARGETS:
         assert set(re.findall(r"\{\{(\w+)\}\}", target["legendFormat"])) <= _left(target["expr"])
+
+
+def test_panels_are_in_order_and_do_not_overlap():
+    assert {panel["type"] for panel in _PANELS} <= {"stat", "table", "timeseries"}
+    assert sorted(panel["id"] for panel in _PANELS) == list(range(1, len(_PANELS) + 1))
+    for panel in _PANELS:
+        assert panel["title"]
+        assert panel["description"]
+        assert panel["datasource"] == _DATASOURCE
+        assert panel["fieldConfig"]["defaults"].get("unit", "short") in {"hertz", "percentunit", "s", "short"}
+        place = panel["gridPos"]
+        assert place["w"] > 0
+        assert place["h"] > 0
+        assert place["x"] + place["w"] <= 24
+        references = [target["refId"] for target in panel["targets"]]
+        assert len(set(references)) == len(references)
+        assert all(target["datasource"] == _DATASOURCE for target in panel["targets"])
+    for one, other in combinations([panel["gridPos"] for panel in _PANELS], 2):
+        apart = [one[at] + one[size] <= other[at] or other[at] + other[size] <= one[at] for at, size in ("xw", "yh")]
+        assert any(apart)
+
+
+def test_it_is_a_dashboard_of_its_own_that_changes_none():
+    assert "id" not in _DASHBOARD
+    assert (_DASHBOARD["title"], _DASHBOARD["uid"]) == ("syncrelay", "syncrelay")
+    assert _DASHBOARD["schemaVersion"] >= 36
+    assert _VARIABLES["datasource"]["type"] == "datasource"
 
 
 def test_every_metric_is_on_it_or_is_read_off_another():

@@ -54,11 +54,17 @@ def at_work(folder):
             command.kill()
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_ends_it_in_order(number, code, tmp_path):
+@pytest.mark.parametrize(
+    ("number", "code", "reaches_workers"),
+    [
+        pytest.param(signal.SIGINT, 130, True, id="Ctrl-C of a terminal"),
+        pytest.param(signal.SIGINT, 130, False, id="SIGINT"),
+        pytest.param(signal.SIGTERM, 143, False, id="SIGTERM"),
+    ],
+)
+def test_a_signal_ends_it_in_order(number, code, reaches_workers, tmp_path):
     with at_work(tmp_path) as (command, workers):
-        # Ctrl-C of a terminal reaches the workers too.
-        for pid in (*(workers if number == signal.SIGINT else ()), command.pid):
+        for pid in (*(workers if reaches_workers else ()), command.pid):
             os.kill(pid, number)
         output, told = command.communicate(timeout=_DEADLINE_S)
     assert (command.returncode, output) == (code, "")
