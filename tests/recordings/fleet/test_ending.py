@@ -113,8 +113,9 @@ def test_a_run_that_is_killed_at_any_moment_ends_as_an_undisturbed_one(tmp_path,
             command.send_signal(number)
             _, said = command.communicate()
             assert "bug in syncrelay" not in said
-            # Python that is just starting or ending handles signals in its own way.
-            assert command.returncode == 128 + number or "ended by" not in said
+            # Python that is just starting or ending handles signals in its own way; and where SIGINT met code that is
+            # made from text, as that of dataclasses, Python ends by the signal itself, which a shell calls 130, too.
+            assert command.returncode in {128 + number, -number} or "ended by" not in said
             killed["command"] += command.returncode != 0
             wait_until(lambda workers=workers: not any(map(is_alive, workers)), "the end of the workers")
     ended = replay_into(tmp_path)
