@@ -63,10 +63,6 @@ class ApproximateTimeEager(Queued):
 
     def _begin(self, stamp: int, outcomes: list[Outcome]) -> None:
         """Note which overflowed messages the only message of its input has missed, and drop what is too far."""
-        # The first messages of the other inputs are within slop of each other.
-        far = [stamps for stamps in self._stamps if stamps and abs(stamps[0] - stamp) > self._slop]
-        if not far:
-            return
         for place, stamps in enumerate(self._stamps):
             if stamps and stamps[0] > stamp + self._slop:
                 self._losses.miss(place, stamps, stamp, before=self._slop, after=self._slop)

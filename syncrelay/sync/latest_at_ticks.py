@@ -95,8 +95,6 @@ class LatestAtTicks(Queued):
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
         queue = self._queues[place]
         self._fed_until = self._until
-        if queue.is_served and stamp <= queue.stamps[0]:
-            return (Drop(message, DropReason.LATE),)
         replaced = queue.insert(stamp, message)
         outcomes: list[Outcome] = [] if replaced is None else [Drop(replaced, DropReason.DUPLICATE)]
         outcomes += self._drop_useless(place, stamp)
@@ -183,13 +181,15 @@ class LatestAtTicks(Queued):
         """
         queue, next_time = self._queues[place], self.ticks.at(self._passed + 1)
         max_age = self._max_ages[place]
-        drops = []
+        drops: list[Drop] = []
         if max_age is not None:
             expired = bisect_left(queue.stamps, next_time - max_age)
             drops = queue.drop(expired, DropReason.EXPIRED)
+        superseded = bisect_right(queue.stamps, next_time) - 1
+        if superseded > 0:
+            drops += queue.drop(superseded, DropReason.SUPERSEDED)
         if stamp <= next_time:
-            superseded = bisect_right(queue.stamps, next_time) - 1
-            return [*drops, *queue.drop(superseded, DropReason.SUPERSEDED)]
+            return drops
         tick, position = self.ticks.first_from(stamp), bisect_left(queue.stamps, stamp)
         if position + 1 < len(queue.stamps) and queue.stamps[position + 1] <= self.ticks.at(tick):
             return [*drops, Drop(queue.remove(position), DropReason.SUPERSEDED)]

@@ -19,7 +19,7 @@ class Prompt:
 
     __slots__ = ("_max_wait", "_policy", "feed")
 
-    def __init__(self, policy: Policy, *, required: Sequence[bool], max_wait_ns: int = 0) -> None:
+    def __init__(self, policy: Policy, *, required: Sequence[bool], max_wait_ns: int) -> None:
         self._policy, stage = policy.for_required(required)
         if stage.inputs:
             raise ValueError("an optional input needs max_wait_ns: a set would wait for it without end")

@@ -43,6 +43,7 @@ def sets_of(outcomes):
 )
 def test_ticks_are_whole_nanoseconds_that_do_not_drift(ticks, index, expected):
     assert ticks.at(index) == expected
+    assert [str(ticks) for ticks in (Ticks(30), Ticks(2997, 100))] == ["30 Hz", "29.97 Hz"]
 
 
 @given(

@@ -114,6 +114,10 @@ class ReferenceGroup:
         self.now = now
         return self.leave(self.due(), now)
 
+    def pass_over(self, *, now):
+        if self.by_clock:
+            self.policy.pass_over(now - (self.max_wait or 0))
+
     def let_go(self, reason):
         drops = [*self.policy.let_go(reason), *self.stage.empty(reason)]
         self.join(())

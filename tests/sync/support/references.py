@@ -1,8 +1,10 @@
 """Each policy slow and obvious: plain lists, no bookkeeping. What is fed must leave as from the engine."""
 
 from itertools import product
+from types import SimpleNamespace
 
 from syncrelay.sync import Drop, DropReason, Match, Message, Outcome
+from syncrelay.sync.latest_at_ticks import REST_NS
 
 
 def by_stamp(message):
@@ -220,3 +222,100 @@ class ReferenceEqualKey(Queued):
         elif len(queue) > self.queue_size:
             left.append(Drop(queue.pop(0), DropReason.OVERFLOW))
         return left
+
+
+class ReferenceAtTicks:
+    """At each tick the latest message of each input that is not too old, if the required ones have one."""
+
+    by_clock = by_stamp = repeats = True
+
+    def __init__(self, policy, options, required):
+        self.n_inputs, self.options, self.required = policy.n_inputs, options, required
+        self.ticks, self.policy = policy.ticks, policy
+        self.queues: list[list[tuple[int, Message]]] = [[] for _ in range(self.n_inputs)]
+        self.served: list[Message] = []
+        self.passed, self.until, self.fed_until = -1, 0, -REST_NS
+
+    def for_required(self, required):
+        return ReferenceAtTicks(self.policy, self.options, required), SimpleNamespace(inputs=())
+
+    def feed(self, place, stamp, message):
+        self.fed_until = self.until
+        left = self.drop(place, lambda old: old == stamp, DropReason.DUPLICATE)
+        self.queues[place].append((stamp, message))
+        self.queues[place].sort(key=lambda each: each[0])
+        soonest = self.ticks.at(self.passed + 1)
+        max_age = self.options.max_ages_ns[place]
+        left += self.drop(place, lambda old: max_age is not None and soonest - old > max_age, DropReason.EXPIRED)
+        # Of the messages between two ticks, or before the next one, a tick takes the last.
+        last = {max(self.ticks.first_from(old), self.passed + 1): old for old, _ in self.queues[place]}
+        left += self.drop(place, lambda old: old not in last.values(), DropReason.SUPERSEDED)
+        if len(self.queues[place]) > self.options.queue_size:
+            first = self.queues[place][0][0]
+            left += self.drop(place, lambda old: old == first, DropReason.OVERFLOW)
+        return left
+
+    def drop(self, place, is_useless, reason):
+        queue = self.queues[place]
+        self.queues[place] = [each for each in queue if not is_useless(each[0])]
+        gone = [message for stamp, message in queue if is_useless(stamp)]
+        return [Drop(message, reason) for message in gone if message not in self.served]
+
+    def taken(self, place, time):
+        """The message of an input that a tick takes."""
+        max_age = self.options.max_ages_ns[place]
+        before = [each for each in self.queues[place] if each[0] <= time]
+        return before[-1] if before and (max_age is None or time - before[-1][0] <= max_age) else (None, None)
+
+    def next_tick(self):
+        stamps = [stamp for queue in self.queues for stamp, _ in queue]
+        # Once all have come, messages only grow older.
+        end = min(self.ticks.first_from(max(stamps, default=0)), self.ticks.last_until(self.fed_until + REST_NS))
+        for tick in range(self.passed + 1, max(end, self.passed + 1) + 1):
+            time = self.ticks.at(tick)
+            taken = [self.taken(place, time)[1] for place in range(self.n_inputs)]
+            if time <= self.fed_until + REST_NS and self.has_required(taken):
+                return time
+        return None
+
+    def has_required(self, taken):
+        return all(message is not None for message, needed in zip(taken, self.required, strict=True) if needed)
+
+    def advance(self, until):
+        self.begin_again_if_fallen(until)
+        left = []
+        while (time := self.next_tick()) is not None and time <= until:
+            members = []
+            for place in range(self.n_inputs):
+                stamp, message = self.taken(place, time)
+                if message is None:
+                    left += self.drop(place, lambda old: old <= time, DropReason.EXPIRED)
+                else:
+                    left += self.drop(place, lambda old, stamp=stamp: old < stamp, DropReason.SUPERSEDED)
+                    self.served.append(message)
+                members.append(message)
+            left.append(Match(tuple(members), tick=time))
+            self.passed = self.ticks.last_until(time)
+        self.passed = max(self.passed, self.ticks.last_until(until))
+        return left
+
+    def begin_again_if_fallen(self, until):
+        if until < self.ticks.at(self.passed) - 1_000_000_000:
+            self.passed = self.ticks.last_until(until)
+            self.fed_until = min(self.fed_until, until)
+        self.until = until
+
+    def pass_over(self, until):
+        self.begin_again_if_fallen(until)
+        self.passed = max(self.passed, self.ticks.last_until(until))
+
+    def let_go(self, reason):
+        lasts = [queue[-1][0] if queue else None for queue in self.queues]
+        return [
+            drop
+            for place, last in enumerate(lasts)
+            for drop in self.drop(place, lambda old, last=last: old != last, reason)
+        ]
+
+    def flush(self, reason):
+        return [drop for place in range(self.n_inputs) for drop in self.drop(place, lambda _: True, reason)]

@@ -205,5 +205,7 @@ class Tally:
                 self.dropped[outcome.message.input][outcome.reason] += 1
 
     def agrees(self, group):
-        told = [(counts.fed, counts.matched, counts.dropped) for counts in group.counts()]
-        return told == list(zip(self.fed, map(len, self.matched), self.dropped, strict=True))
+        return [(counts.fed, counts.matched, counts.dropped, counts.buffered) for counts in group.counts()] == [
+            (fed, len(matched), dropped, fed - len(matched) - dropped.total())
+            for fed, matched, dropped in zip(self.fed, self.matched, self.dropped, strict=True)
+        ]
