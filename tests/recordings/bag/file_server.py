@@ -42,6 +42,8 @@ def file_server() -> Iterator[FileServer]:
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
         timeout = 60
+        # Otherwise a body waits 40 ms for the client to acknowledge its header.
+        disable_nagle_algorithm = True
 
         def log_message(self, *_):
             pass
