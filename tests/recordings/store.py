@@ -1,11 +1,6 @@
-"""A store that fsspec knows as store://: a folder, as if it were far away. It may refuse files, or be full.
+"""A store that fsspec knows as store://: a folder, as if it were far away. It may refuse files, or be full."""
 
-As a script: FOLDER REFUSED FILE_SIZE WORD... runs syncrelay where it is known, and no file may be larger, unless -1.
-"""
-
-import resource
 import shutil
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +9,6 @@ from unittest.mock import patch
 import pytest
 
 from syncrelay import urls
-from syncrelay.cli import main
 
 fsspec = pytest.importorskip("fsspec", reason="the extra `fleet` is not installed")
 local = pytest.importorskip("fsspec.implementations.local")
@@ -55,10 +49,3 @@ def known_store(folder: Path, wrong: int) -> Iterator[None]:
         patch.object(urls, "_FIRST_WAIT", 0.01),
     ):
         yield
-
-
-if __name__ == "__main__":
-    _folder, _wrong, _file_size, *_words = sys.argv[1:]
-    resource.setrlimit(resource.RLIMIT_FSIZE, (int(_file_size), int(_file_size)))
-    with known_store(Path(_folder), int(_wrong)):
-        sys.exit(main(_words))

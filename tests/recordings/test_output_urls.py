@@ -1,14 +1,14 @@
 """What commands write behind URLs, where fsspec knows one more store: a folder, as if it were far away."""
 
 import json
-from functools import partial
+import resource
 from pathlib import Path
 
 import pyarrow.dataset
 import pyarrow.parquet
 import pytest
 
-from tests.cli.command import ROOT, run, run_here, run_python
+from tests.cli.command import run_here
 from tests.recordings.bag.making import rig, rig_file, write_mcap
 from tests.recordings.store import known_store
 
@@ -23,16 +23,15 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def stored(folder: Path, *words: str, wrong: int = 0):
-    """Run syncrelay where store:// is the folder `store`, which refuses the first files."""
+def stored(folder: Path, *words: str, wrong: int = 0, file_size: int = -1):
+    """Run syncrelay where store:// is the folder `store`, which refuses the first files; no file may be larger."""
+    _, most = resource.getrlimit(resource.RLIMIT_FSIZE)
     with known_store(folder / "store", wrong):
-        return run_here(*words, folder=folder)
-
-
-def stored_by_process(folder: Path, *words: str, wrong: int = 0, file_size: int = -1):
-    """The same by a process, which may have processes of its own, and write no file larger than that."""
-    told = (str(folder / "store"), str(wrong), str(file_size))
-    return run_python("-m", "tests.recordings.store", *told, *words, folder=folder, environ={"PYTHONPATH": f"{ROOT}"})
+        resource.setrlimit(resource.RLIMIT_FSIZE, (file_size, most))
+        try:
+            return run_here(*words, folder=folder)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
 
 
 def names(folder: Path) -> list[str]:
@@ -69,16 +68,16 @@ _NOT_HERE = "cannot be written to a temporary folder of this machine before the 
 
 
 @pytest.mark.parametrize(
-    ("run", "why"),
+    ("limit", "why"),
     [
-        (partial(stored, wrong=-1), "cannot be written: No space left on device\n"),
-        (partial(stored_by_process, file_size=1000), f"{_NOT_HERE}: set TMPDIR to another folder\n"),
+        ({"wrong": -1}, "cannot be written: No space left on device\n"),
+        ({"file_size": 1000}, f"{_NOT_HERE}: set TMPDIR to another folder\n"),
     ],
     ids=["in the store", "here"],
 )
-def test_where_there_is_no_space_is_said(run, why, folder):
+def test_where_there_is_no_space_is_said(limit, why, folder):
     words = ["replay", "rig.mcap", "--config", "f.yaml", "-o", "store://day/out"]
-    done = run(folder, *words)
+    done = stored(folder, *words, **limit)
     assert (done.returncode, done.stderr) == (1, f"syncrelay: store://day/out: {why}")
     assert names(folder / "store") == []
 
@@ -124,22 +123,22 @@ def test_the_results_of_a_fleet_are_kept_in_a_store_and_done_once(folder):
     for name in ("a", "b"):
         write_mcap(folder / "day" / f"{name}.mcap", rig())
     words = ["export", "day", "--config", "f.yaml", "--jobs", "2", "-o"]
-    done = stored_by_process(folder, *words, "store://results/of day", wrong=1)
+    done = stored(folder, *words, "store://results/of day", wrong=1)
     assert (done.returncode, done.stdout) == (0, "store://results/of day: 2 recordings: 2 done\n"), done.stderr
     into = folder / "store" / "results" / "of day"
-    assert run(*words, "here", folder=folder).returncode == 0
+    assert run_here(*words, "here", folder=folder).returncode == 0
     assert names(into) == names(folder / "here")
     entries = [json.loads(line) for line in (into / "_ledger.jsonl").read_text().splitlines()[1:]]
     assert [entry["state"] for entry in entries] == ["done", "done"]
-    assert "--overwrite" in stored_by_process(folder, *words, "store://results/of day", "--raw").stderr
+    assert "--overwrite" in stored(folder, *words, "store://results/of day", "--raw").stderr
     tables = [pyarrow.dataset.dataset(where).to_table().num_rows for where in (str(into), str(folder / "here"))]
     assert tables[0] == tables[1] > 70
 
-    assert stored_by_process(folder, *words, "store://results/of day").stdout.endswith("2 done before\n")
+    assert stored(folder, *words, "store://results/of day").stdout.endswith("2 done before\n")
     next(into.glob("b-*/*")).unlink()
-    assert stored_by_process(folder, *words, "store://results/of day").stdout.endswith("1 done, 1 done before\n")
+    assert stored(folder, *words, "store://results/of day").stdout.endswith("1 done, 1 done before\n")
     (folder / "day" / "b.mcap").write_bytes(b"none any more")
-    assert stored_by_process(folder, *words, "store://results/of day").returncode == 1
+    assert stored(folder, *words, "store://results/of day").returncode == 1
     assert [name for name in names(into) if name.startswith("b-")] == []
 
 
