@@ -47,8 +47,8 @@ class Terminal:
         self.press(text)
         self.wait_for(until)
 
-    def wait_for_end(self):
-        end = time.monotonic() + _DEADLINE_S
+    def wait_for_end(self, deadline_s=_DEADLINE_S):
+        end = time.monotonic() + deadline_s
         while self._read(end):
             pass
         return self._process.wait(_DEADLINE_S)

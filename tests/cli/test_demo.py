@@ -53,17 +53,6 @@ def running(pid):
         return False
 
 
-def demo_for(stage, seconds):
-    """A demo of so many seconds that came to its end, and how many: more where a busy machine left a group no set."""
-    for longer in (seconds, 2 * seconds, 6 * seconds, 12 * seconds):
-        stage.environment["TWICE_AS_LONG_S"] = f"{2 * longer}"
-        demo = stage.start("demo", [*_DEMO, "--seconds", f"{longer}"])
-        if demo.wait(2 * longer + DEADLINE_S) == 0:
-            break
-    assert demo.wait() == 0, demo.stdout + demo.stderr
-    return demo, longer
-
-
 @pytest.mark.ros
 def test_it_matches_a_simulated_rig_until_a_signal_ends_it_sums_up_and_leaves_nothing(stage):
     demo = stage.start("demo", [*_DEMO, "--seed", "7"])
@@ -94,15 +83,6 @@ def test_it_matches_a_simulated_rig_until_a_signal_ends_it_sums_up_and_leaves_no
     assert "\x1b" not in demo.stdout
     # Of what a busy machine makes of a rig, the relay may warn.
     assert [line for line in demo.said if not line.startswith("[WARN]")] == []
-
-
-@pytest.mark.ros
-def test_its_time_and_its_relay_begin_when_all_sensors_publish(stage):
-    # Longer than the demo runs, and than a relay waits for messages before it asks for them.
-    stage.before_each_sensor("import os, time; time.sleep(float(os.environ['TWICE_AS_LONG_S']))")
-    demo, _ = demo_for(stage, 3)
-    assert set(summed_up(demo.stdout)) == {"camera_lidar", "lidar_imu"}
-    assert "nobody publishes" not in demo.stderr
 
 
 @pytest.mark.ros
@@ -164,23 +144,22 @@ def test_the_rig_does_not_outlive_it_though_it_hangs(stage):
 
 
 @pytest.mark.ros
-def test_a_terminal_sees_the_strip_and_keeps_the_summary(stage):
-    screen = shown_on_terminal(stage)
-    drawn, _, after = screen.partition("\x1b[?1049l")
-    assert "Starting a simulated camera" in drawn.partition("\x1b[?1049h")[2]
-    assert re.search(r"camera -12 ms.*A", drawn)
-    assert "each letter is a set" in drawn
-    assert "38;5" not in screen  # the stage sets NO_COLOR
-    assert set(summed_up(after)) == {"camera_lidar", "lidar_imu"}
-
-
-def shown_on_terminal(stage):
-    """Run a demo to its end on a terminal, for longer where a busy machine left a group no set; all that it wrote."""
+def test_a_terminal_sees_the_strip_from_when_all_sensors_publish_and_keeps_the_summary(stage):
+    # Longer than the demo runs, and than a relay waits for messages before it asks for them.
+    stage.before_each_sensor("import os, time; time.sleep(float(os.environ['TWICE_AS_LONG_S']))")
+    # Longer where a busy machine left a group no set.
     for seconds in (3, 6, 15, 45):
         argv = [*_DEMO, "--seconds", f"{seconds}"]
-        with on_terminal(argv, folder=stage.folder, environ=stage.environment) as terminal:
-            code = terminal.wait_for_end()
+        environ = {**stage.environment, "TWICE_AS_LONG_S": f"{2 * seconds}"}
+        with on_terminal(argv, folder=stage.folder, environ=environ) as terminal:
+            code = terminal.wait_for_end(2 * seconds + DEADLINE_S)
         if code == 0:
             break
     assert code == 0, terminal.written
-    return terminal.written
+    drawn, _, after = terminal.written.partition("\x1b[?1049l")
+    assert "Starting a simulated camera" in drawn.partition("\x1b[?1049h")[2]
+    assert re.search(r"camera -12 ms.*A", drawn)
+    assert "each letter is a set" in drawn
+    assert "38;5" not in terminal.written  # the stage sets NO_COLOR
+    assert set(summed_up(after)) == {"camera_lidar", "lidar_imu"}
+    assert "nobody publishes" not in terminal.written
