@@ -36,8 +36,9 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have what changed be read at the first look."""
+    """Have what changed be read at the first look, and looks follow each other."""
     monkeypatch.setattr(rereading, "_SETTLED_S", 0.0)
+    monkeypatch.setattr(rereading, "_LOOK_S", 0.01)
 
 
 @pytest.fixture
