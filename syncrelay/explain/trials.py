@@ -367,10 +367,10 @@ class Trials:
     def clock_offset(self, index: int) -> Change | None:
         """Return the offset that brings an input of another clock to the time of the required inputs."""
         by = self.apart(index)
-        offset = self.config.topics[index].offset_ns
-        stamps = self.inputs[index].stamps
-        scale = time_scale(int(stamps[-1]) if len(stamps) else 0, by)
-        return offset_change(index, (by if scale is None else scale[1]) + offset) if by else None
+        if not by:
+            return None
+        scale = time_scale(int(self.inputs[index].stamps[-1]), by)
+        return offset_change(index, (by if scale is None else scale[1]) + self.config.topics[index].offset_ns)
 
     def apart(self, index: int) -> int:
         """Return how much later after its stamp an input's message comes than the required ones' do; 0 if unknown."""

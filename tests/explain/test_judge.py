@@ -7,7 +7,7 @@ from syncrelay.explain.judge import EXPLAINS
 from syncrelay.sync.messages import DropReason
 from tests.explain.support import cases_flow, cases_graph, cases_stamps
 from tests.explain.support.cases import STRANGER, UNFIT, camera, fed, said_of_cases
-from tests.explain.support.groups import BEGAN, MS, NOW, S, a_group, a_silent_group, an_input
+from tests.explain.support.groups import S, a_group, a_silent_group, an_input
 
 FOUND = cases_graph.FOUND | cases_stamps.FOUND | cases_flow.FOUND
 QUIETLY = [
@@ -103,12 +103,3 @@ def test_an_explanation_is_the_first_of_the_worst():
 
 def test_an_explanation_of_nothing_bad_is_the_last_word():
     assert explanation(found_in(FOUND["stamps that fell"])).code is Code.HEALTHY
-
-
-def test_a_group_is_silent_after_five_seconds_or_three_sets():
-    assert not a_group(figures={"last_set": NOW - 4999 * MS}).is_silent
-    assert a_group(figures={"last_set": NOW - 5 * S}).is_silent
-    assert not a_group(figures={"last_set": NOW - 29 * S, "best_hz": 0.1}).is_silent
-    assert a_group(figures={"last_set": NOW - 30 * S, "best_hz": 0.1}).is_silent
-    assert not a_group(figures={"last_set": NOW - 29 * S}, every=100).is_silent
-    assert a_group(figures={"last_set": None, "began": BEGAN}).is_silent

@@ -87,18 +87,6 @@ def test_an_input_that_is_silent_has_no_rate_but_had_one():
     assert stage.inputs[0].last_received == BEGAN + 4900 * MS + 2 * MS
 
 
-def test_a_slow_input_is_silent_after_five_periods():
-    stage = Stage()
-    for second in range(51):
-        stage.second([(stage.now, stage.now)] if second % 5 == 0 else [])
-    for _ in range(23):
-        stage.second()
-    assert stage.inputs[0].rate_hz > 0
-    for _ in range(3):
-        stage.second()
-    assert stage.inputs[0].rate_hz == 0
-
-
 def test_one_message_has_no_rate_and_few_no_usual_one():
     stage = Stage()
     stage.second([(BEGAN, BEGAN)])
@@ -196,15 +184,6 @@ def test_a_pause_does_not_slow_an_input():
     for _ in range(3):
         stage.second(stage.stream(20))
         assert stage.inputs[0].slowed_from_hz is None
-
-
-def test_an_input_whose_rate_varies_has_none_to_fall_from():
-    stage = Stage()
-    for hz in (5, 10, 20, 40) * 10:
-        stage.second(stage.stream(hz))
-    for _ in range(30):
-        stage.second(stage.stream(2))
-    assert stage.inputs[0].slowed_from_hz is None
 
 
 def a_set(stage, *, span=5 * MS, latency=MS, second=True):

@@ -27,6 +27,8 @@ _RECKONED: Final = {
     ast.BitOr: ast.BitAnd,
     ast.BitAnd: ast.BitOr,
 }
+# A number this large is doubled: of a billion nanoseconds, nobody could see one more.
+_MANY: Final = 1000
 # What is said to people, and what is read by tools alone.
 _SAID: Final = frozenset({"log", "info", "warning", "error", "debug", "exception"})
 _FOR_TOOLS: Final = frozenset({"__slots__", "__all__", "__repr__"})
@@ -91,12 +93,12 @@ def _other_values(node: ast.expr) -> Iterator[ast.expr]:
         case ast.IfExp():
             yield from (node.body, node.orelse)
         case ast.Constant(value=bool() | int() | float() as value):
-            yield ast.Constant(not value if isinstance(value, bool) else value + 1)
+            yield ast.Constant(not value if isinstance(value, bool) else value + (1 if value < _MANY else value))
 
 
 def _other_statements(node: ast.stmt) -> Iterator[str]:
     match node:
-        case ast.Return(value=ast.expr() as value) if not _is_none(value):
+        case ast.Return(value=ast.expr() as value) if not _is_nothing(value):
             yield "return None"
         case ast.Break():
             yield "continue"
@@ -113,8 +115,9 @@ def _with(node: ast.expr, **fields: object) -> ast.expr:
     return other
 
 
-def _is_none(value: ast.expr) -> bool:
-    return isinstance(value, ast.Constant) and value.value is None
+def _is_nothing(value: ast.expr) -> bool:
+    """Whether it is None or False: what asks for the truth of a result takes one for the other."""
+    return isinstance(value, ast.Constant) and (value.value is None or value.value is False)
 
 
 def _code(node: ast.AST) -> Iterator[ast.AST]:

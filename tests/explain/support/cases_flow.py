@@ -89,20 +89,10 @@ FOUND = {
 QUIETLY = {
     Code.SHORT_QUEUE: {
         "an overflow of what nobody missed": a_silent_group(overflowing(None), LIDAR),
-        "a queue that was long enough": a_silent_group(overflowing(10), LIDAR),
         "an overflow beside a stream of another clock": a_silent_group(
             overflowing(40), an_input("/lidar", figures={"delay": 37 * S})
         ),
-        "an overflow while all sets leave": a_group(overflowing(40), LIDAR),
         "an overflow long ago": a_silent_group(camera(counts=fed(needed_queue=40)), LIDAR),
-    },
-    Code.WAITING_FOR_OPTIONAL: {
-        "a set in twenty without an optional input": a_group(
-            camera(required=False), LIDAR, figures={"missing": (0.05, 0.0)}
-        ),
-        "an optional input that has been back for three times as many sets as it missed": a_group(
-            camera(required=False), LIDAR, figures={"missing": (0.5, 0.0), "sets_since_without": (6, 100)}
-        ),
     },
     Code.BURSTS: {
         "messages that came at once because the relay stood still": a_group(
@@ -116,12 +106,9 @@ QUIETLY = {
             LIDAR,
             standstills=(Standstill(NOW - 5 * S, 2 * S),),
         ),
-        "messages that lay for less than half a second": a_group(waited=499 * MS),
     },
     Code.FEW_SETS: {
-        "enough sets": a_group(figures={"share": Share(80, 100, 10 * S)}),
         "few sets while none leaves": a_silent_group(figures={"share": Share(40, 100, 10 * S)}, standing=Standing.NONE),
-        "few sets of too few to tell": a_group(figures={"share": Share(1, 9, 10 * S)}, **FEW),
     },
     Code.STARTING: {
         "no set yet where something is wrong": a_group(
