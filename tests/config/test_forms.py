@@ -29,14 +29,15 @@ def error_of(tmp_path, monkeypatch, environ):
     return load_bytes
 
 
+_EMPTY = "f.yaml: the file is empty, expected at least `version: 1` and `groups:`"
+
+
 @pytest.mark.parametrize(
     ("content", "error"),
     [
-        pytest.param(b"", "f.yaml: the file is empty, expected at least `version: 1` and `groups:`", id="empty"),
-        pytest.param(
-            b"# later\n---\n", "f.yaml: the file is empty, expected at least `version: 1` and `groups:`", id="comment"
-        ),
-        pytest.param(b"~\n", "f.yaml: the file is empty, expected at least `version: 1` and `groups:`", id="null"),
+        pytest.param(b"", _EMPTY, id="empty"),
+        pytest.param(b"# later\n---\n", _EMPTY, id="comment"),
+        pytest.param(b"~\n", _EMPTY, id="null"),
         pytest.param(
             b"version: 1\nname: fr\xf6nt\n",
             "f.yaml:2:9: byte 0xf6 at offset 19 is not UTF-8\n    2 | name: fr\ufffdnt\n      |         ^",

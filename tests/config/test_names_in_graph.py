@@ -173,23 +173,16 @@ _AB_AND_CB = {
 }
 
 
+_LOOP = "which makes a loop: choose another `output`"
+_OWN = "is a topic that the node itself uses for"
+_OF_MANIFEST = "remap it to another name, or set `manifest: false`"
+
+
 @pytest.mark.parametrize(
     ("rules", "sentence"),
     [
-        (
-            {"/f/a": "/a"},
-            (
-                "the default output `/a`, remapped from `/f/a`, is also an input (line 10), which makes a loop:"
-                " choose another `output`"
-            ),
-        ),
-        (
-            {"/a": "/f/a"},
-            (
-                "the default output `/f/a` is also an input (line 10, remapped from `/a`), which makes a loop:"
-                " choose another `output`"
-            ),
-        ),
+        ({"/f/a": "/a"}, f"the default output `/a`, remapped from `/f/a`, is also an input (line 10), {_LOOP}"),
+        ({"/a": "/f/a"}, f"the default output `/f/a` is also an input (line 10, remapped from `/a`), {_LOOP}"),
         ({"/a": "/b"}, "`/b` is in this group twice, first on line 10, remapped from `/a`"),
         (
             {"/f/a": "/f/b"},
@@ -197,25 +190,13 @@ _AB_AND_CB = {
         ),
         (
             {"~/f/sets": "/diagnostics"},
-            (
-                "its manifest `/diagnostics`, remapped from `/syncrelay/f/sets`, is a topic that the node itself uses"
-                " for its diagnostics: remap it to another name, or set `manifest: false`"
-            ),
+            f"its manifest `/diagnostics`, remapped from `/syncrelay/f/sets`, {_OWN} its diagnostics: {_OF_MANIFEST}",
         ),
         (
-            {"~/g/sets": "/same", "~/f/sets": "/same"},
-            (
-                "its manifest `/same`, remapped from `/syncrelay/g/sets`, is a topic that the node itself uses for the"
-                " manifest of the group f: remap it to another name, or set `manifest: false`"
-            ),
+            {"~/g/sets": "/n", "~/f/sets": "/n"},
+            f"its manifest `/n`, remapped from `/syncrelay/g/sets`, {_OWN} the manifest of the group f: {_OF_MANIFEST}",
         ),
-        (
-            {"~/f/sets": "/f/b"},
-            (
-                "the output `/f/b` is a topic that the node itself uses for the manifest of the group f: choose"
-                " another `output`"
-            ),
-        ),
+        ({"~/f/sets": "/f/b"}, f"the output `/f/b` {_OWN} the manifest of the group f: choose another `output`"),
     ],
 )
 def test_a_name_that_a_remap_made_is_said_beside_the_one_in_the_file(rules, sentence):

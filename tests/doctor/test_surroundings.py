@@ -1,6 +1,8 @@
 """The checks of environment, network, memory and limits, by values."""
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from syncrelay.doctor.container import Isolation, check_isolation
 from syncrelay.doctor.diagnosis import Severity
@@ -19,29 +21,21 @@ def brief(diagnoses):
     return [(each.code, each.severity) for each in diagnoses]
 
 
-@pytest.mark.parametrize(
-    ("text", "domain"),
-    # As rcl took them when it was tried: strtoul with base 0.
-    [
-        ("", 0),
-        ("0", 0),
-        ("42", 42),
-        ("+5", 5),
-        (" 5", 5),
-        ("5 ", 5),
-        ("5abc", 5),
-        ("010", 8),
-        ("0x10", 16),
-        ("232", 232),
-        ("233", None),
-        ("-1", None),
-        ("abc", None),
-        ("08", None),
-        ("1.5", 1),
-    ],
+@given(
+    st.integers(0, 300),
+    st.sampled_from(["{}{}{}", "{}{:#x}{}", "{}0{:o}{}"]),
+    st.sampled_from(["", " ", "+"]),
+    st.sampled_from(["", " ", ".5", "nodes"]),
 )
-def test_a_domain_is_read_as_ros_reads_it(text, domain):
-    assert domain_of({"ROS_DOMAIN_ID": text}) == domain
+def test_a_domain_is_read_as_ros_reads_it(number, form, before, after):
+    # As rcl took them when it was tried: strtoul with base 0.
+    domain = number if number <= 232 and (number or not after) else None
+    assert domain_of({"ROS_DOMAIN_ID": form.format(before, number, after)}) == domain
+
+
+def test_an_empty_domain_is_0_the_last_is_232_and_other_words_are_none():
+    expected = {"": 0, "0": 0, "232": 232, "233": None, "-1": None, "abc": None, "08": None}
+    assert {text: domain_of({"ROS_DOMAIN_ID": text}) for text in expected} == expected
 
 
 LOCALHOST = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
