@@ -29,6 +29,16 @@ def test_a_drift_is_measured_in_the_noise(ppm):
     assert found.watched_ns == 119 * S
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_what_was_held_up_changes_no_drift(seed):
+    chance = random.Random(seed)
+    held_up = {second: chance.randint(30, 60) * MS for second in chance.sample(range(120), 3)}
+    found = drift(points(lambda second: second * 0.1 * MS + held_up.get(second, 0), noise=0.01 * MS))
+    assert found is not None
+    assert found.slope * 1e6 == pytest.approx(100, abs=1)
+    assert found.points == 120 - len(held_up)
+
+
 def test_a_line_has_no_bend():
     found = drift(points(lambda second: second * 100_000))
     assert found is not None

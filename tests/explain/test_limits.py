@@ -313,6 +313,7 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "away": (0, 9 * S, S + 1, lambda by: without("been silent", last_received=NOW - by)),
     "away by its rate": (0, 9 * S, 3 * S + 1, lambda by: without("been silent", last_received=NOW - by, usual_hz=1.0)),
     "of another clock": (0, 9 * S, S + 5 * MS + 1, lambda by: without("its stamps are", delay=by)),
+    "of another clock, ahead": (0, -5 * S, 5 * MS - S - 1, lambda by: without("ahead of", delay=by)),
     "far from all": (0, 60 * MS, 20 * MS + 1, lambda by: without("the nearest sets", nearest=Distribution([by] * 9))),
     "enough to be far": (0, 9, 5, lambda n: without("the nearest sets", nearest=Distribution([60 * MS] * n))),
     "too late": (0, 900 * MS, 105 * MS + 1, lambda by: without("too late", delay=by)),

@@ -147,18 +147,6 @@ def test_a_jump_back_is_told_with_its_length_and_is_no_disorder():
     assert (figures.fell_by, figures.fell_at, figures.out_of_order) == (2900 * MS, BEGAN + S, 0)
 
 
-def test_drops_are_those_of_the_window():
-    stage = Stage()
-    stage.second(stage.stream(10), dropped={DropReason.LATE: 7})
-    stage.second(stage.stream(10), dropped={DropReason.OVERFLOW: 2})
-    assert stage.inputs[0].dropped == {DropReason.LATE: 7, DropReason.OVERFLOW: 2}
-    for _ in range(9):
-        stage.second(stage.stream(10))
-    assert stage.inputs[0].dropped == {DropReason.OVERFLOW: 2}
-    stage.second(stage.stream(10))
-    assert stage.inputs[0].dropped == {}
-
-
 def test_an_input_that_falls_to_a_tenth_of_its_pace_has_slowed_until_it_is_back():
     stage = Stage()
     for _ in range(20):
@@ -211,14 +199,6 @@ def test_the_best_rate_is_that_of_the_slowest_required_input_or_of_the_trigger()
     assert of() == 5
     assert of(required=[True, True, False]) == 10
     assert of(policy="latest_time", trigger="/in0") == 20
-
-
-def test_what_was_missing_is_a_share_of_the_window():
-    stage = Stage(required=[True, False])
-    stage.second(stage.stream(4), sets=[a_set(stage, second=False)] * 100)
-    for _ in range(10):
-        stage.second(stage.stream(4), sets=[*[a_set(stage)] * 3, a_set(stage, second=False)])
-    assert stage.group.missing == (0.0, 0.25)
 
 
 def test_nearest_sets_are_measured_with_offsets_and_since_the_last_set():
@@ -365,3 +345,53 @@ def test_inputs_whose_stamps_fall_are_observed_as_others():
         falling = [(stage.now - nth * 50 * MS, stage.now + nth * 100 * MS) for nth in range(10)]
         stage.second(falling, falling)
     assert stage.observation.figures(now=stage.now)[1][0].out_of_order == 27
+
+
+_LOOKS = st.lists(
+    st.tuples(
+        st.sampled_from([1, 1, 2, 2, 3, 6, 10, 20, 21]),
+        st.integers(0, 3),
+        st.lists(st.booleans(), max_size=4),
+        st.integers(0, 2),
+        st.sampled_from([False, False, False, True]),
+    ),
+    min_size=1,
+    max_size=30,
+)
+
+
+@given(_LOOKS)
+def test_figures_are_those_of_the_looks_of_the_last_ten_seconds(looks):
+    """Against all looks that there were: half seconds since the last, messages, sets with the optional input, drops."""
+    stage = Stage(required=[True, False])
+    history = [(BEGAN, 0, 0, list[bool](), 0)]
+    last_set = resumed = None
+    fed = dropped = 0
+    for halves, came, sets, drops, resumes in looks:
+        if resumes:
+            stage.observation.begin_sets_anew(stage.now)
+            resumed = stage.now
+        now = stage.now + halves * S // 2
+        # Sets begin again with the first, and with the next after a silence of 5 s that two looks have seen.
+        if sets and (last_set is None or (now - last_set >= 5 * S and not history[-1][3])):
+            resumed = now
+        last_set = now if sets else last_set
+        fed, dropped = fed + came, dropped + drops
+        history.append((now, fed, history[-1][2] + len(sets), sets, dropped))
+        stage.second(
+            [(BEGAN + fed - n, now) for n in range(came)],
+            sets=[a_set(stage, second=has_optional) for has_optional in sets],
+            dropped={DropReason.LATE: drops} if drops else {},
+            length=halves * S // 2,
+        )
+        group, (one, _) = stage.observation.figures(now=now)
+        begin = max((each for each in history[:-1] if each[0] <= now - 10 * S), default=history[0])
+        assert (one.fed, one.dropped.get(DropReason.LATE, 0)) == (fed - begin[1], dropped - begin[4])
+        if resumed is not None and begin[0] < resumed < now:
+            begin = next(each for each in history if each[0] >= resumed)
+        assert group.rate_hz == (history[-1][2] - begin[2]) * S / (now - begin[0])
+        recent = [has for at, _, _, sets, _ in history for has in sets if at > now - 10 * S]
+        assert group.missing == (0, recent.count(False) / max(1, len(recent)))
+        whole = [has for _, _, _, sets, _ in history for has in sets]
+        assert group.sets_since_without[1] == next((n for n, has in enumerate(whole[::-1]) if not has), len(whole))
+        assert (group.last_set, group.resumed, group.sets) == (last_set, resumed, len(whole))

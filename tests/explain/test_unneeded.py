@@ -57,9 +57,9 @@ def test_no_more_drops_are_costly_than_sets_were_missed():
 
 
 def test_where_a_clock_makes_the_sets_only_what_gave_way_to_a_newer_message_is_not_needed():
-    dropped = [{DropReason.SUPERSEDED: 20, DropReason.EXPIRED: 3}, {}]
-    fates, _ = drop_fates(dropped, may_set_pace((True, True), trigger=None, by_clock=True))
-    assert (fates.unneeded, fates.others) == (20, {DropReason.EXPIRED: 3})
+    dropped = [{DropReason.SUPERSEDED: 20, DropReason.EXPIRED: 3}, {DropReason.EXPIRED: 1}]
+    fates, other = drop_fates(dropped, may_set_pace((True, True), trigger=None, by_clock=True))
+    assert (fates.unneeded, fates.others, other.unneeded) == (20, {DropReason.EXPIRED: 3}, 0)
 
 
 def test_what_is_left_is_the_most_telling():

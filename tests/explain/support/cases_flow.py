@@ -40,6 +40,9 @@ FOUND = {
     "messages of all inputs that were held up together": a_group(
         held_up(NOW - 4 * S, NOW - 2 * S), an_input("/lidar", figures=HELD_UP)
     ),
+    "messages of all inputs that were recorded late together": a_group(
+        held_up(NOW - 4 * S, NOW - 2 * S), an_input("/lidar", figures=HELD_UP), is_recorded=True
+    ),
     "messages of two inputs of three that were held up together": a_group(
         held_up(NOW - 3 * S, NOW - S), an_input("/lidar", figures=HELD_UP), an_input("/imu")
     ),

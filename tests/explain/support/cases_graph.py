@@ -103,6 +103,7 @@ FOUND = {
     "a recording that was paused": a_silent_group(
         camera(figures=QUIET), an_input("/lidar", figures=QUIET), is_recorded=True
     ),
+    "an input whose recording stopped": a_silent_group(camera(figures=QUIET), LIDAR, is_recorded=True),
     "no clock at all": a_silent_group(clock=ClockState(received=False, stopped=7 * S)),
 }
 
