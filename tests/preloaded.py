@@ -48,12 +48,7 @@ _MAINS: Final = {
     "syncrelay": "syncrelay.cli",
     **{
         name: name
-        for name in (
-            "tests.faults.source",
-            "tests.faults.witness",
-            "tests.ros.collector",
-            "tests.ros.player",
-        )
+        for name in ("tests.faults.source", "tests.faults.witness", "tests.ros.collector", "tests.ros.player")
     },
 }
 # What nodes import while they run. A module that is not installed here is skipped.
@@ -183,13 +178,7 @@ def run(
         )
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as talk:
         process = start(
-            argv,
-            stdin=subprocess.PIPE,
-            stdout=out,
-            stderr=talk,
-            env=environ,
-            cwd=folder,
-            imported=Imported.COMMANDS,
+            argv, stdin=subprocess.PIPE, stdout=out, stderr=talk, env=environ, cwd=folder, imported=Imported.COMMANDS
         )
         assert process.stdin is not None
         try:

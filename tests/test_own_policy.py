@@ -175,11 +175,7 @@ class Mine(Group):
         ("Mine = 3", "Mine", "robot_policies:Mine is no subclass of syncrelay.config.models.Group"),
         (_MODEL.replace('["mine"]', '["other"]'), "Mine", "`policy` of robot_policies:Mine has to be Literal['mine']"),
         (_MODEL.replace("tuple[Topic, ...]", "list[int]"), "Mine", "`topics` of robot_policies:Mine has to be a tuple"),
-        (
-            _MODEL + '    trigger_key = "lead"',
-            "Mine",
-            "the trigger_key of robot_policies:Mine is `lead`, which",
-        ),
+        (_MODEL + '    trigger_key = "lead"', "Mine", "the trigger_key of robot_policies:Mine is `lead`, which"),
         (_MODEL.replace("build_policy", "build"), "Mine", "robot_policies:Mine has no build_policy of its own"),
         (_MODEL + "    slop: int = 3", "Mine", "the key `slop` of Mine has another type than that of Approximate"),
         (_MODEL + '    gap: "Gap"', "Mine", "PydanticUserError: `Mine` is not fully defined"),

@@ -227,12 +227,7 @@ def test_fish_is_told_what_may_follow_and_why(folder, environ):
         check=False,
     )
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.splitlines() == [
-        f"validate\t{COMMANDS['validate'].does}",
-        "fusion.yaml",
-        "front",
-        "rear",
-    ]
+    assert done.stdout.splitlines() == [f"validate\t{COMMANDS['validate'].does}", "fusion.yaml", "front", "rear"]
 
 
 def test_the_places_that_the_help_names_are_those_of_the_page_on_installing():

@@ -95,11 +95,7 @@ def beating(heartbeat):
 def test_the_command_and_the_bare_probe_say_the_same(tmp_path, command):
     def probe(**environment):
         run = subprocess.run(
-            [sys.executable, *command],
-            env={**os.environ, **environment},
-            capture_output=True,
-            text=True,
-            check=False,
+            [sys.executable, *command], env={**os.environ, **environment}, capture_output=True, text=True, check=False
         )
         return run.returncode, run.stdout.strip()
 

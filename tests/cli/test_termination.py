@@ -13,12 +13,7 @@ _ENVIRON = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONSAFEPATH": "1"}
 
 
 @pytest.mark.parametrize(
-    "words",
-    [
-        ["export", "bag.mcap", "--config", "pipe", "-o", "out"],
-        ["test", "pipe"],
-    ],
-    ids=lambda words: words[0],
+    "words", [["export", "bag.mcap", "--config", "pipe", "-o", "out"], ["test", "pipe"]], ids=lambda words: words[0]
 )
 def test_a_command_that_sigterm_ends_exits_with_143_and_no_traceback(words, tmp_path):
     os.mkfifo(tmp_path / "pipe")

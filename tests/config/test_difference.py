@@ -64,11 +64,7 @@ def test_what_says_the_same_changes_nothing(new, environ):
         (
             {},
             {"keys": "output_prefix: /new"},
-            [
-                ("output_prefix", None, "/new"),
-                ("/a output", "/front/a", "/new/a"),
-                ("/b output", "/front/b", "/new/b"),
-            ],
+            [("output_prefix", None, "/new"), ("/a output", "/front/a", "/new/a"), ("/b output", "/front/b", "/new/b")],
         ),
     ],
 )

@@ -12,10 +12,7 @@ A, B, C = {"topic": "/a"}, {"topic": "/b"}, {"topic": "/c"}
 
 def file(**groups) -> str:
     return json.dumps(
-        {
-            "version": 1,
-            "groups": {name: {"policy": "exact_time", "topics": topics} for name, topics in groups.items()},
-        }
+        {"version": 1, "groups": {name: {"policy": "exact_time", "topics": topics} for name, topics in groups.items()}}
     )
 
 

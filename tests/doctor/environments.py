@@ -10,15 +10,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 # What syncrelay itself needs, for a Python that is started without its site-packages.
-OURS = (
-    "pydantic",
-    "pydantic_core",
-    "annotated_types",
-    "typing_extensions",
-    "typing_inspection",
-    "yaml",
-    "numpy",
-)
+OURS = ("pydantic", "pydantic_core", "annotated_types", "typing_extensions", "typing_inspection", "yaml", "numpy")
 
 
 def site_with(folder, packages):

@@ -143,11 +143,7 @@ def test_a_ros_beside_its_wheels_is_one_too_many(base, tmp_path):
     (tmp_path / "ros/share/ament_index/resource_index/packages/rclpy").touch()
     (tmp_path / "wheels/rclpy").mkdir()
     (tmp_path / "wheels/rclpy/__init__.py").touch()
-    environ = {
-        **base,
-        "PYTHONPATH": f"{ROOT}:{tmp_path / 'wheels'}",
-        "AMENT_PREFIX_PATH": str(tmp_path / "ros"),
-    }
+    environ = {**base, "PYTHONPATH": f"{ROOT}:{tmp_path / 'wheels'}", "AMENT_PREFIX_PATH": str(tmp_path / "ros")}
     _, found = examine(environ)
     assert f"ROS 2 is sourced ({tmp_path / 'ros'}), and its wheels" in found["two_ros"]["what"]
 

@@ -100,10 +100,7 @@ def test_its_page_shows_what_is_printed():
         "/lidar/points", publishers=(), type=CLOUD, counts=never, figures=nothing, alike=("/ouster/points",)
     )
     imu = an_input(
-        "/imu/data",
-        publishers=(Endpoint("/imu_driver", IMU),),
-        type=IMU,
-        figures={"rate_hz": 199.8, "delay": 2 * MS},
+        "/imu/data", publishers=(Endpoint("/imu_driver", IMU),), type=IMU, figures={"rate_hz": 199.8, "delay": 2 * MS}
     )
     facts = a_silent_group(camera, lidar, imu)
     reports = (GroupReport(facts, judge(facts)),)
