@@ -50,18 +50,6 @@ def test_it_prints_figures_curves_fates_findings_and_a_suggestion(folder):
     assert "`slop: 3ms`" in done.stdout
 
 
-def test_types_that_the_file_leaves_out_change_nothing(folder):
-    topics = [{"topic": topic} for topic in _TOPICS]
-    (folder / "untyped.yaml").write_text(
-        config({"front": {"policy": "approximate_time", "slop": "1ms", "topics": topics}})
-    )
-    typed, untyped = (
-        run_here("analyze", "rig.mcap", "--config", file, folder=folder) for file in ("f.yaml", "untyped.yaml")
-    )
-    assert (untyped.returncode, untyped.stderr) == (0, "")
-    assert untyped.stdout == typed.stdout.replace("f.yaml", "untyped.yaml")
-
-
 def test_the_json_holds_the_same_for_programs(folder):
     done = run_here("analyze", "rig.mcap", "--config", "f.yaml", "--json", folder=folder)
     found = json.loads(done.stdout)
@@ -88,15 +76,6 @@ def test_the_written_file_gives_what_was_promised(folder, tmp_path):
     assert read_summary(replayed.stdout)["front"].sets == 100
     again = run_here("analyze", "rig.mcap", "--config", "f.yaml", "--write", written, folder=folder)
     assert (again.returncode, again.stderr) == (1, f"syncrelay: {written}: already exists and is not overwritten\n")
-
-
-def test_comments_of_the_file_stay(folder, tmp_path):
-    run_here("demo", "--record", str(tmp_path / "demo.mcap"), "--seconds", "10", folder=folder)
-    written = tmp_path / "better.yaml"
-    run_here("analyze", str(tmp_path / "demo.mcap"), "--config", "demo.yaml", "--write", str(written), folder=folder)
-    before = {line.partition("#")[2] for line in shipped_config().splitlines() if "#" in line}
-    assert before <= {line.partition("#")[2] for line in written.read_text().splitlines()}
-    assert run_here("validate", str(written), folder=folder).returncode == 0
 
 
 def test_where_there_is_nothing_to_change_no_file_is_written(folder, tmp_path):

@@ -148,20 +148,6 @@ def test_messages_that_cannot_be_decoded_are_told(tmp_path):
     assert exported(tmp_path, "front").read()["/lidar"].null_count == 4
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["--fields", "/camera:vectr"], "has no field `vectr`, did you mean `vector`?"),
-        (["--images", "/lidar=png"], "/lidar is geometry_msgs/msg/Vector3Stamped, expected sensor_msgs/msg/Image"),
-    ],
-)
-def test_what_a_type_does_not_have_is_a_fault_of_the_recording(tmp_path, words, told):
-    write_mcap(tmp_path / "bag.mcap", rig())
-    (tmp_path / "pair.yaml").write_text(PAIR)
-    done = run("export", "bag.mcap", "--config", "pair.yaml", "-o", "out", *words, folder=tmp_path)
-    assert (done.returncode, told in done.stderr) == (1, True), done.stderr
-
-
 def test_memory_does_not_grow_with_the_recording(tmp_path):
     image = STORE.types["sensor_msgs/msg/Image"]
     empty = np.zeros(4_000_000, np.uint8)

@@ -70,14 +70,6 @@ def test_a_file_alone_in_a_directory_needs_groups_as_any_other(folder, environ):
     assert errors(environ, "conf") == ["conf/node.yaml:1:1: groups: missing, expected one group or more"]
 
 
-def test_an_error_names_the_file_in_the_directory(folder, environ):
-    (folder / "a.yaml").write_text(FRONT)
-    (folder / "b.yaml").write_text(FRONT)
-    assert errors(environ, "conf")[0] == (
-        "conf/b.yaml:3:3: groups.front: the group `front` is also on line 3 of conf/a.yaml: rename one of them"
-    )
-
-
 def test_a_directory_of_very_many_files_is_not_read(folder, environ):
     for number in range(MOST_FILES + 1):
         (folder / f"{number}.yaml").touch()

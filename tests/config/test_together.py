@@ -96,16 +96,3 @@ def test_defaults_without_a_group_are_refused(environ):
     assert errors(environ, one="version: 1\ndefaults: {queue_size: 5}\n", two=FRONT) == [
         "one.yaml:2:1: defaults: `defaults` apply to groups of the same file, and this file has none"
     ]
-
-
-def test_everything_wrong_with_all_files_is_told_at_once(environ):
-    assert errors(environ, one=FRONT.replace("policy", "polcy"), two="a: 1\n b: 2\n", three="") == [
-        "one.yaml:4:5: groups.front.polcy: unknown key, did you mean `policy`?",
-        "two.yaml:2:2: indented deeper than the line above, which has a value already",
-        "three.yaml: the file is empty, expected at least `version: 1` and `groups:`",
-    ]
-    assert errors(environ, one=FRONT.replace("version: 1", "version: 2"), two=FRONT.replace("exact", "exakt")) == [
-        "one.yaml:1:10: version: expected 1, the version of the format, found the number `2`",
-        "two.yaml:3:3: groups.front: the group `front` is also on line 3 of one.yaml: rename one of them",
-        "two.yaml:4:13: groups.front.policy: unknown value `exakt_time`, did you mean `exact_time`?",
-    ]

@@ -16,17 +16,6 @@ def _heard(live, group, *, first, count):
     live.take(group, [[(at, at + 20 * MS) for at in camera], [(at + 7 * MS, at + 37 * MS) for at in camera]])
 
 
-def test_a_slop_that_fits_is_suggested():
-    read = load_text(config({"front": _GROUP}))
-    live = LiveStreams(read.groups)
-    for second in range(5):
-        _heard(live, "front", first=10 * second, count=10)
-    (analysis,) = analyze_live(read, read.groups, live)
-    suggestion = analysis.suggestion
-    assert (suggestion.possible, suggestion.now, suggestion.then) == (50, 0, 50)
-    assert [(each.key, each.value) for each in suggestion.changes if each.key == "slop"] == [("slop", "7ms")]
-
-
 def test_messages_are_in_the_order_of_their_arrival():
     read = load_text(config({"front": _GROUP}))
     live = LiveStreams(read.groups)

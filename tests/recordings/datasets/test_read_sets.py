@@ -12,11 +12,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from syncrelay.config import load_text
 from syncrelay.errors import BagError, UsageError
-from syncrelay.recordings.bag import open_recording
-from syncrelay.recordings.bag.bindings import bind
-from syncrelay.recordings.bag.replay import received, replay
 from syncrelay.recordings.datasets import read_sets
-from syncrelay.sync import Match
 from tests.recordings.bag.making import CUSTOM, rig, write_mcap, write_ros1, write_rosbag2
 from tests.recordings.datasets import times
 from tests.ros.cdr_messages import STORE, VECTOR
@@ -41,32 +37,6 @@ def config(more=""):
 
 def rows_of(*args, **options):
     return [row for batch in read_sets(*args, **options) for row in times.rows_of(batch)]
-
-
-def replayed(path, loaded):
-    """What a replay tells of each set: stamps, when it left, and its latency."""
-    told = []
-
-    def note(_binding, outcome, now):
-        if isinstance(outcome, Match):
-            last = max(received(each) for each in outcome.messages if each is not None)
-            told.append((outcome.stamps, now, now - last))
-
-    recording = open_recording([str(path)])
-    replay(recording, bind(loaded, recording), listeners=[note])
-    recording.close()
-    return told
-
-
-def test_a_row_is_a_set_of_replay(tmp_path):
-    bag = write_mcap(tmp_path / "bag.mcap", rig())
-    rows = rows_of(bag, config())
-    assert [
-        ((row["stamps"]["/camera"], row["stamps"]["/lidar"]), row["left_at"], row["latency_ns"]) for row in rows
-    ] == replayed(bag, config())
-    assert len(rows) > 30
-    assert [row["set"] for row in rows] == list(range(1, len(rows) + 1))
-    assert {row["recording"] for row in rows} == {str(bag)}
 
 
 def test_a_row_tells_spans_with_offsets_and_its_newest_stamp(tmp_path):
