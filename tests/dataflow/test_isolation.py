@@ -8,6 +8,7 @@ from threading import Thread
 import pytest
 
 from syncrelay.dataflow.backend import PublishError
+from syncrelay.dataflow.bugs import Bugs, OnceLog
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.inbox import PolledInbox
 from syncrelay.dataflow.receive import ReceiveLoop
@@ -50,7 +51,7 @@ def _drive(group: GroupRelay, step: str) -> None:
         case "flush":
             group.flush(DropReason.TIME_JUMP)
         case "counts":
-            group.counts()
+            assert len(group.counts()) == 2
         case "next_deadline":
             group.next_deadline()
 
@@ -131,18 +132,29 @@ def test_a_message_that_cannot_be_published_is_counted_and_told_and_the_group_go
     outlets = [Outlet(), Outlet()]
     connect(group, outlets)
     told = []
-    for n in range(4):
-        outlets[1].refusal = PublishError("no memory") if n == 2 else None
+    for n in range(5):
+        outlets[1].refusal = PublishError("no memory") if n in {2, 3} else None
         for index in range(2):
             group.flow.receive(index, Named(b"%d" % n), BEGIN + n * MS)
         told.append(dict(group.unpublished))
-    assert told == [{}, {}, {1: (1, "no memory")}, {}]
-    assert [outlet.log for outlet in outlets] == [[b"0", b"1", b"2", b"3"], [b"0", b"1", b"3"]]
+    assert told == [{}, {}, {1: (1, "no memory")}, {1: (2, "no memory")}, {}]
+    assert [outlet.log for outlet in outlets] == [[b"0", b"1", b"2", b"3", b"4"], [b"0", b"1", b"4"]]
     assert group.failure is None
     assert [record.message for record in caplog.records] == [
         "front: a message could not be published on /out: no memory; trying again with the next one",
-        "front: publishing on /out again; 1 message was not published",
+        "front: publishing on /out again; 2 messages were not published",
     ]
+
+
+def test_a_line_that_would_repeat_is_logged_once_and_of_bugs_a_hundred(caplog):
+    once, bugs = OnceLog(), Bugs()
+    for level, text in ((30, "a"), (40, "b"), (30, "a"), (40, "a")):
+        once.log(level, text)
+    assert [(record.levelno, record.message) for record in caplog.records] == [(30, "a"), (40, "b")]
+    for number in (*range(150), 0):
+        with bugs.contained("looking"):
+            raise ValueError(number)
+    assert [str(record.exc_info[1]) for record in caplog.records[2:]] == [str(number) for number in range(100)]
 
 
 class _Watch:

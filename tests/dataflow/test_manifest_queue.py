@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from typing import Any
 
 import pytest
 
@@ -21,8 +22,8 @@ from tests.ros.streams import BEGIN, MS
 class _Told:
     """A group of two inputs whose sets are told."""
 
-    def __init__(self, queue: ManifestQueue, name: str = "front") -> None:
-        self.group = group_of(name=name, topics=["/a", "/b"])
+    def __init__(self, queue: ManifestQueue, name: str = "front", **keys: Any) -> None:
+        self.group = group_of(name=name, topics=["/a", "/b"], **keys)
         self.outlets, self.manifest = (Outlet(), Outlet()), Outlet()
         topics = [("/a", f"/{name}/a"), ("/b", f"/{name}/b")]
         writer = ManifestWriter(self.group.config, node="/syncrelay", topics=topics)
@@ -84,13 +85,25 @@ def test_sets_are_counted_while_nobody_listens(queue):
 
 def test_a_manifest_that_cannot_be_published_is_said_once_and_costs_no_set(queue, caplog):
     told = _Told(queue)
-    for refusal in (PublishError("no room"), PublishError("no room"), None):
+    for refusal in (*[PublishError("no room")] * 2, None, PublishError("no room")):
         told.manifest.refusal = refusal
         told.feed_sets()
         queue.publish()
-    assert [outlet.sent for outlet in told.outlets] == [3, 3]
+    assert [outlet.sent for outlet in told.outlets] == [4, 4]
     assert told.numbers == [3]
-    assert [record.message for record in caplog.records] == ["front: a manifest could not be published: no room"]
+    assert [record.message for record in caplog.records] == ["front: a manifest could not be published: no room"] * 2
+
+
+def test_of_a_set_with_a_common_stamp_it_is_told_which_outputs_have_it(queue):
+    told = _Told(queue, policy="approximate_time_eager", slop="20ms", restamp="latest")
+    told.group.connect(1, told.outlets[1], restamped=True)
+    for index, ms in ((0, 4), (1, 9), (0, 29), (1, 24)):
+        told.group.flow.receive(index, Named(b"", BEGIN), BEGIN + ms * MS)
+    queue.publish()
+    first, second = map(read, told.manifest.log)
+    assert [each.common_stamp for each in (first, second)] == [BEGIN + 9 * MS, BEGIN + 29 * MS]
+    stamps = [[(each.stamp - BEGIN) // MS for each in manifest.inputs] for manifest in (first, second)]
+    assert stamps == [[4, 9], [29, 29]]
 
 
 def test_a_bug_costs_one_manifest_and_no_set(queue, caplog):

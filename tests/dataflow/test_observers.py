@@ -64,6 +64,7 @@ _SETTLED = [(0, 1)] * 6
 )
 def test_only_what_a_known_publisher_lost_of_late_is_a_loss(totals_and_publishers, recent, in_all):
     losses = Losses()
+    assert losses.recent == 0
     for total, publishers in totals_and_publishers:
         losses.observe(total, publishers=publishers)
     assert (losses.recent, losses.total) == (recent, in_all)
@@ -109,12 +110,13 @@ def test_simulated_time_is_known_for_the_messages_between_two_evaluations(rate):
     assert clock.at(2_500_000_000) == round(2.5 * rate * _SECOND)
 
 
-@pytest.mark.parametrize(("before", "after"), [(0, 5), (5, 4)])
-def test_a_simulated_clock_that_began_or_was_set_back_tells_nothing_of_the_time_before(before, after):
+@pytest.mark.parametrize(("before", "after", "passed"), [(0, 5, 1), (5, 4, 1), (5, 6, 0)])
+def test_a_simulated_clock_that_began_or_was_set_back_tells_nothing_of_the_time_before(before, after, passed):
     clock = SimulatedClock()
     clock.observe(before * _SECOND, now=_SECOND)
-    clock.observe(after * _SECOND, now=2 * _SECOND)
+    clock.observe(after * _SECOND, now=(1 + passed) * _SECOND)
     assert not clock.is_steady
+    assert clock.at(0) == (after - 1 - passed) * _SECOND
 
 
 # Fast DDS's: every node announces itself so often, and is known some tenths of a second after it was heard.
