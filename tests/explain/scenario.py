@@ -344,6 +344,7 @@ class _Relay:
             },
         )
         found = self._judge.judge(self.facts)
+        assert not any("None" in f"{each.text} {each.suggestion or ''}" for each in found)
         self.found.append((second, found))
         remarks = [*self._log.remarks(self.facts, found, self._judge.explained(self.facts))]
         if self._hears is not None:

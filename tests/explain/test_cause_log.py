@@ -8,10 +8,12 @@ from itertools import groupby, pairwise
 
 import pytest
 
-from syncrelay.explain import CauseLog, Endpoint, Finding, GroupFacts
+from syncrelay.explain import CauseLog, Code, Endpoint, Finding, GroupFacts, Severity
 from syncrelay.explain.cause_log import Line
+from syncrelay.explain.codes import OF_RELAY
 from syncrelay.explain.finding_log import Remark
 from tests.explain.scenario import S, Source, run
+from tests.explain.support.groups import a_group, an_input
 from tests.faults.extent import chosen
 
 _SEEDS = range(chosen(short=3, long=300))
@@ -153,3 +155,17 @@ def _is_all_silent(rig: _Rig) -> bool:
     """Whether nothing comes from anybody, which has one cause: the network, or who plays a recording."""
     used = {topic for topics in rig.groups.values() for topic in topics}
     return used <= rig.silent and len({rig.node_of(topic) for topic in used}) > 1 and not rig.gone
+
+
+@pytest.mark.parametrize("code", sorted(OF_RELAY, key=str))
+@pytest.mark.parametrize("about", [None, 0])
+def test_a_cause_of_the_relay_is_one_line_for_all_groups_unless_it_is_about_an_input(code: Code, about: int | None):
+    log = CauseLog()
+    log.watch(["front", "rear"])
+    found = Finding(code, Severity.WARN, "so it is", input=about)
+    for name in ("front", "rear"):
+        camera = an_input(f"/{name}/camera", node=f"/{name}_driver")
+        log.hear(a_group(camera, name=name), (found,), [Remark(Severity.WARN, "so it is", (found,))], now=S)
+    lines = [line.text for line in log.lines(now=7 * S)]
+    assert len(lines) == (1 if about is None else 2)
+    assert about is not None or lines[0] == "2 groups (front and rear): so it is"

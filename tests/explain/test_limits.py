@@ -29,6 +29,7 @@ from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.input_observation import InputObservation
 from syncrelay.explain.rhythm import PaceWatch, bursts, steady_period
 from syncrelay.explain.standing import StandingWatch
+from syncrelay.explain.unneeded import DropFates
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
 from tests.explain.support.cases import AGES, LIDAR, STEADY, camera, dropped, overflowing, without_camera
@@ -38,7 +39,7 @@ from tests.explain.support.groups import BEGAN, IMAGE, MS, NOW, S, a_group, a_si
 IsSo = Callable[[int], bool]
 TWO = Endpoint("/a", IMAGE), Endpoint("/b", IMAGE)
 DAY = 86_400 * S
-WARN = Severity.WARN
+WARN, EXPIRED = Severity.WARN, DropReason.EXPIRED
 NEW = {"flows_since": None}
 UNSENT = {"counts": InputCounts(0, 0, {}, 0), "figures": {"last_received": None, "rate_hz": 0.0, "fed": 0}}
 BURST = {"bursts": 1, "held": S}
@@ -50,6 +51,7 @@ HELD = {**AGES, "trigger": 1}
 def told(facts: Any, code: Code, text: str | Severity = "") -> bool:
     """Whether a finding is told, with some words, or as bad as that."""
     found = [each for each in judge(facts) if each.code is code]
+    assert not any("None" in f"{each.text} {each.suggestion or ''}" for each in found)
     return any(each.severity is text if isinstance(text, Severity) else text in str(each) for each in found)
 
 
@@ -126,8 +128,8 @@ def held_up(hz: float) -> Any:
     return a_group(camera(figures=both), an_input("/lidar", figures=both), an_input("/imu", figures={"usual_hz": hz}))
 
 
-def overflows(rate_hz: float) -> Any:
-    return a_group(overflowing(40), LIDAR, figures={"rate_hz": rate_hz})
+def overflows(rate_hz: float, best_hz: float = 10.0) -> Any:
+    return a_group(overflowing(40), LIDAR, figures={"rate_hz": rate_hz, "best_hz": best_hz})
 
 
 def few(share: Share, **graph: Any) -> Any:
@@ -308,6 +310,9 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "most over slop": (0, 100, 51, lambda n: told(a_group(BURSTING, LIDAR, figures=spans(n, 100)), Code.OVER_SLOP)),
     "a queue too short": (0, 99, 11, lambda n: told(a_silent_group(overflowing(n), LIDAR), Code.SHORT_QUEUE)),
     "missed for a queue": (1000, 0, 949, lambda hz: told(overflows(hz / 100), Code.SHORT_QUEUE)),
+    "missed of few for a queue": (200, 0, 179, lambda hz: told(overflows(hz / 100, 2.0), Code.SHORT_QUEUE)),
+    "sets to tell that few leave": (0, 99, 10, lambda n: told(few(Share(1, n, 10 * S)), Code.FEW_SETS)),
+    "mostly not needed": (99, 0, 49, lambda n: bool(DropFates({EXPIRED: 100}, {EXPIRED: n}).mostly_unneeded)),
     "missing in sets": (0, 1000, 70, lambda n: missing(n / 1000)),
     "back in sets": (99, 0, 5, lambda n: missing(0.5, since=n)),
     "away": (0, 9 * S, S + 1, lambda by: without("been silent", last_received=NOW - by)),

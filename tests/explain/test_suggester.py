@@ -113,6 +113,13 @@ def test_no_offset_is_offered_for_another_clock_whose_stamps_would_not_match_by_
     assert cured == []
 
 
+def test_an_offset_is_offered_for_an_optional_input_of_another_clock():
+    imu = Source("/imu", hz=10, required=False, clock=lambda _: 5.25)
+    _, cured = rig(CAMERA, LIDAR, imu, slop="20ms", max_wait="100ms")
+    assert [offers(finding) for finding, _, _ in cured] == [[([("offset", "-5.25s", "/imu")], cured[0][2])]]
+    assert_cured(cured, offered=1)
+
+
 def a_suggester(budget: TryBudget | None = None) -> Suggester:
     """Of a group whose stamps lie 30 ms apart, with a slop of 20 ms."""
     config = group_of([CAMERA, LIDAR], {"slop": "20ms"})

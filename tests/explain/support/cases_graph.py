@@ -84,6 +84,7 @@ FOUND = {
     "nothing came ever": a_silent_group(
         camera(counts=InputCounts(0, 0, {}, 0), figures={**ONCE, "last_received": None}), LIDAR
     ),
+    "nothing came lately": a_silent_group(camera(figures={**ONCE, "last_received": None}), LIDAR),
     "nothing comes any more": a_silent_group(camera(figures=QUIET), LIDAR),
     "nothing came for long": a_silent_group(camera(figures={**QUIET, "last_received": NOW - 21 * S}), LIDAR),
     "nothing of what is held comes any more, which always came": a_group(camera(figures=QUIET), LIDAR, **AGES),
