@@ -191,6 +191,12 @@ def twice(world: World, target: str, _: float) -> End:
     return _set(world, target, is_twice=True)
 
 
+@_kind("sensor", names="over_slop constant_offset few_sets silent slowed clock_drift out_of_order short_queue")
+def stamps_early(world: World, target: str, _: float) -> End:
+    """Stamps are too early, by more than sets may span."""
+    return _set(world, target, shift=-80 * MS)
+
+
 # Delays that grow and fall with each batch, or as what was lost is sent again, look like a drift where few messages
 # make one: its clock is to be modelled.
 @_kind("sensor", names="bursts short_queue silent slowed waiting_for_optional few_sets out_of_order clock_drift")

@@ -169,7 +169,7 @@ def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
     if chance.random() < 0.15:
         node["lifecycle"] = True
     if chance.random() < 0.1:
-        node["coalesce"] = "5ms"
+        node["coalesce"] = chance.choice(["5ms", "100ms"])
     chaotic = chance.random() < 0.35
     plan = Plan(
         seed,

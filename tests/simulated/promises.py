@@ -1,6 +1,7 @@
 """What must hold in every world, judged by what the world knows and not by what the relay says of itself."""
 
 import logging
+import re
 from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
@@ -31,9 +32,16 @@ _HERE_S: Final = 8.0
 _NAMED_BY_S: Final = 45.0
 # A lazy group sleeps so long after the last of those who listen has left.
 _ASLEEP_S: Final = 8.0
+# What is said of a group's sets is held against those of so long, if it was looked at all the while.
+_SHOWN_S: Final = 25.0
+_LOOKS_S: Final = 3.0
+_SETS_ARE_MISSING: Final = frozenset({"few_sets", "over_slop", "unexplained"})
+_SILENT_FOR: Final = re.compile(r"(/\w+) has been silent for ([\d.]+) s|without (/\w+).*silent for ([\d.]+) s")
 _QUIET: Final = frozenset({"healthy", "starting", "nobody_listens"})
 # Messages are of no known moment, or cannot leave.
-_ODD: Final = frozenset({"doubles", "refuse_messages", "second_publisher", "other_clock", "unstamped"})
+_ODD: Final = frozenset({"doubles", "refuse_messages", "second_publisher", "stamps_early", "other_clock", "unstamped"})
+# Messages come that make no set.
+_BETWEEN: Final = frozenset({"doubles", "second_publisher"})
 _SUBSCRIBES_AGAIN: Final = frozenset(
     {
         "best_effort",
@@ -72,6 +80,16 @@ class Set(NamedTuple):
 
     at: float
     numbers: tuple[int | None, ...]
+
+
+class _Moment(NamedTuple):
+    """A moment that could make a set: its first message, when the last was sent, and when the set left if it did."""
+
+    topic: str
+    number: int
+    at: float
+    came: float
+    left: float | None
 
 
 class Seen(NamedTuple):
@@ -158,8 +176,16 @@ class Promises:
             about = frozenset(topics[index] for index in first.about)
             self.seen[name].append(Seen(self.world.now, first.code.value, about, first.text))
             told = [(each.code, each.about, each.text) for each in report.findings]
+            self._look_for_punctual(name, [text for _, _, text in told])
             if len(set(told)) < len(told):
                 self.broken.append(f"{self.world.now:.2f} s: {name}: a finding is there twice: {told}")
+
+    def _look_for_punctual(self, name: str, texts: Iterable[str]) -> None:
+        """Look whether somebody is called silent who has more time to send."""
+        for found in filter(None, map(_SILENT_FOR.search, texts)):
+            topic, seconds = (each for each in found.groups() if each is not None)
+            if float(seconds) < 1.5 / (self.world.plan.hz * self.world.plan.sensor(topic).every):
+                self.broken.append(f"{self.world.now:.2f} s: {name}: {found[0]}, which is as usual")
 
     def _look_for_unjudged(self, name: str) -> None:
         now, before = self.world.now, self._judged[name]
@@ -209,6 +235,7 @@ class Promises:
         for each in plan.groups:
             self.broken += self._wrong_sets(each)
             self.broken += self._missing_sets(each)
+            self.broken += self._belied(each)
             self.broken += self._wrong_ticks(each)
             self.broken += self._false_findings(each)
         return self.broken
@@ -272,35 +299,56 @@ class Promises:
     def _is_calm(self, group: Group, at: float) -> bool:
         return not any(begin <= at <= end for begin, end in self._spoilt(group))
 
-    def _missing_sets(self, group: Group) -> Iterator[str]:
-        """Yield the moments of which no set left though all was well, and the sets that took too long."""
-        world, plan = self.world, self.world.plan
-        if group.by_clock:
-            return
-        end = min(plan.length, world.now) - _LATE_S - 2 / plan.hz - 1
-        spoilt = self._spoilt(group)
-        slack = _LATE_S + 2 / plan.hz + (0.3 if group.optional else 0)
+    def _moments(self, group: Group) -> Iterator[_Moment]:
+        """Yield the moments of which all required inputs were sent, by the number of the first of them."""
+        plan = self.world.plan
         triggers = group.topics[:1] if group.repeats else group.required
         anchor = triggers[0]
-        sets = {each.numbers[group.topics.index(anchor)]: each for each in self.sets[group.name]}
+        sets = {each.numbers[group.topics.index(anchor)]: each.at for each in self.sets[group.name]}
         of = plan.sensor(anchor).every
         for number, at in self._written[anchor].items():
             if number % of and not group.repeats:
                 continue
-            sampled = at - plan.sensor(anchor).takes / SECOND
-            if at > end or any(begin <= sampled <= over for begin, over in spoilt):
+            others = [self._written[topic].get(number // of * plan.sensor(topic).every) for topic in triggers]
+            came = [each for each in others if each is not None]
+            if len(came) == len(others):
+                yield _Moment(anchor, number, at, max(came), sets.get(number))
+
+    def _missing_sets(self, group: Group) -> Iterator[str]:
+        """Yield the moments of which no set left though all was well, and the sets that took too long."""
+        plan = self.world.plan
+        end = min(plan.length, self.world.now) - _LATE_S - 2 / plan.hz - 1
+        slack = _LATE_S + 2 / plan.hz + (0.3 if group.optional else 0)
+        for anchor, number, at, came, left in () if group.by_clock else self._moments(group):
+            if at > end or not self._is_calm(group, at - plan.sensor(anchor).takes / SECOND):
                 continue
-            moment = number // of
-            others = [self._written[topic].get(moment * plan.sensor(topic).every) for topic in triggers]
-            if None in others:
-                continue
-            came = max(each for each in others if each is not None)
-            left = sets.get(number)
             if left is None:
                 yield f"{at:.2f} s: {group.name}: no set of message {number} of {anchor}"
                 return
-            if left.at > came + slack:
-                yield f"{at:.2f} s: {group.name}: the set of message {number} of {anchor} left at {left.at:.2f} s"
+            if left > came + slack:
+                yield f"{at:.2f} s: {group.name}: the set of message {number} of {anchor} left at {left:.2f} s"
+                return
+
+    def _belied(self, group: Group) -> Iterator[str]:
+        """Yield what is said of a group's sets while those that leave show the contrary, whatever befalls it."""
+        moments = [] if group.by_clock else list(self._moments(group))
+        times = [each.came for each in moments]
+        sent = [each.at for each in self.sets[group.name]]
+        healthy_since = None
+        for before, seen in pairwise(self.seen[group.name]):
+            goes_on = seen.code == "healthy" and seen.at - before.at < _LOOKS_S
+            healthy_since = (healthy_since or seen.at) if goes_on else None
+            lately = moments[bisect_left(times, seen.at - _SHOWN_S) : bisect_left(times, seen.at - _LATE_S)]
+            left = sum(each.left is not None and each.left < seen.at for each in lately)
+            is_well = healthy_since is not None and seen.at - healthy_since > _SHOWN_S
+            if is_well and bisect_left(sent, seen.at) - bisect_left(sent, seen.at - _SHOWN_S) < len(lately) / 3 - 5:
+                yield f"{seen.at:.2f} s: {group.name}: {seen.code}: {seen.text}\n    but few sets leave"
+                return
+            is_bad = seen.code in _SETS_ARE_MISSING and len(lately) > (_SHOWN_S - _LATE_S) * self.world.plan.hz - 3
+            is_odd = self._happened(_BETWEEN, seen.at - HEALED_S, seen.at)
+            if is_bad and left == len(lately) and self._is_calm(group, seen.at) and not is_odd:
+                what = f"{left} of {len(lately)} sets left in the last {_SHOWN_S:g} s"
+                yield f"{seen.at:.2f} s: {group.name}: {seen.code}: {seen.text}\n    but {what}"
                 return
 
     def _wrong_ticks(self, group: Group) -> Iterator[str]:

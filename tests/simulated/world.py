@@ -367,7 +367,8 @@ class World:
         at, name, _ = self.answers[asked]
         self.answers[asked] = at, name, answer
         is_last = all(other in _SENDS_NOTHING_NEW for _, other, _ in self.answers[asked + 1 :])
-        if (name == "pause" or (name == "deactivate" and answer is True)) and is_last:
+        # A call that the end cuts short succeeds in nothing.
+        if ((name == "pause" and answer.success) or (name == "deactivate" and answer is True)) and is_last:
             self.still_since = self.now
 
     def reload(self) -> None:
