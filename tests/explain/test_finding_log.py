@@ -74,12 +74,6 @@ def test_after_a_minute_of_health_a_silence_is_new():
     assert told(silence, range(120, 150), last_set=lambda _: 119) == [124, 129, 139]
 
 
-def test_a_slow_group_is_given_three_periods():
-    silence = FindingLog()
-    lines = {second: looked(silence, at(second, last_set=0, best_hz=0.1)) for second in range(1, 40)}
-    assert [second for second, said in lines.items() if said and said[0].text.startswith("no more sets")] == [30]
-
-
 def warned(silence, seconds, *findings):
     facts = [a_group(figures={"now": NOW + second * S, "last_set": NOW + second * S}) for second in seconds]
     lines = []
@@ -126,13 +120,6 @@ def test_what_did_not_last_has_no_end_to_say():
     silence = FindingLog()
     warned(silence, range(3), REPEATS)
     assert warned(silence, range(3, 40)) == []
-
-
-def test_a_warning_is_forgotten_after_a_minute():
-    silence = FindingLog()
-    assert len(warned(silence, range(10), REPEATS)) == 1
-    assert len(warned(silence, range(10, 71))) == 1
-    assert warned(silence, range(71, 100), REPEATS) == [(76, "stamps repeat; look there")]
 
 
 def test_what_is_no_warning_is_never_said():

@@ -87,14 +87,6 @@ def test_an_input_that_is_silent_has_no_rate_but_had_one():
     assert stage.inputs[0].last_received == BEGAN + 4900 * MS + 2 * MS
 
 
-def test_one_message_has_no_rate_and_few_no_usual_one():
-    stage = Stage()
-    stage.second([(BEGAN, BEGAN)])
-    assert stage.inputs[0].rate_hz == stage.inputs[0].usual_hz == 0
-    stage.second([(BEGAN + S, BEGAN + S)])
-    assert (stage.inputs[0].rate_hz, stage.inputs[0].usual_hz) == (1.0, 0.0)
-
-
 def test_the_longest_pause_is_that_of_the_last_messages():
     stage = Stage()
     stage.second(stage.stream(10))
@@ -334,17 +326,6 @@ def test_bursts_are_counted_for_ten_seconds_also_where_a_look_parts_them():
     for _ in range(11):
         stage.second(stage.stream(100))
     assert (stage.inputs[0].bursts, stage.inputs[0].held) == (0, 0)
-
-
-def test_looks_that_are_far_apart_are_no_silences():
-    stage = Stage()
-    for _ in range(3):
-        stage.second(stage.stream(10), sets=[a_set(stage)] * 10, length=5 * S + 10 * MS)
-    resumed = stage.group.resumed
-    stage.second(length=5 * S + 10 * MS)
-    assert resumed == BEGAN + 5 * S + 10 * MS
-    stage.second(stage.stream(10), sets=[a_set(stage)] * 10, length=5 * S + 10 * MS)
-    assert stage.group.resumed == stage.now
 
 
 def test_inputs_whose_stamps_fall_are_observed_as_others():
