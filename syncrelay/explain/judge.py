@@ -201,7 +201,8 @@ class Judge:
         if facts.is_silent:
             self._too_wide = None
             return ()
-        is_back = (facts.figures.share.value or 1) >= BACK
+        share = facts.figures.share.value
+        is_back = share is None or share >= BACK
         wide = next((each for each in found if each.code is Code.OVER_SLOP), None)
         # What is the effect of another cause is over when its cause is.
         own = wide if wide is not None and self._root(wide, facts) is wide else None

@@ -16,6 +16,7 @@ from syncrelay.explain import (
     Endpoint,
     Finding,
     FindingLog,
+    Judge,
     Severity,
     Share,
     Standing,
@@ -178,6 +179,15 @@ def at_ticks(max_wait: int = 0, **figures: Any) -> Any:
     return a_group(camera(figures=came), LIDAR, figures=figures, **ticks)
 
 
+def still_too_wide(left: int) -> bool:
+    """Whether sets that were too wide count as too wide while so many of 100 leave."""
+    a_judge, half = Judge(), {**spans(50, 100), "share": Share(50, 100, 10 * S)}
+    for _ in range(2):
+        assert len(a_judge.judge(a_group(figures=half, standing=Standing.FEW))) == 1
+    found = a_judge.judge(a_group(figures={"share": Share(left, 100, 10 * S)}, standing=Standing.FEW))
+    return Code.OVER_SLOP in {each.code for each in found}
+
+
 def says(*seconds: int, groups: int = 1, recovers: bool = False) -> list[int]:
     """At which of these moments the relay's log has a line about a silence of the first of some groups."""
     log, found, lines = CauseLog(), Finding(Code.SILENT, Severity.ERROR, "silent", input=0), []
@@ -326,6 +336,7 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "too old at ticks": (0, 60 * S, 10 * S, lambda by: told(at_ticks(began=NOW - by, rate_hz=5.0), Code.OVER_SLOP)),
     "too few at ticks": (1000, 0, 949, lambda hz: told(at_ticks(rate_hz=hz / 100), Code.OVER_SLOP)),
     "too old but for a wait": (S, 0, 205 * MS - 1, lambda by: told(at_ticks(by, rate_hz=5.0), Code.OVER_SLOP)),
+    "too wide until": (100, 0, 94, still_too_wide),
     # How a group stands, by the percent of its sets that leave.
     "few": (100, 0, 79, lambda n: stands(n) is Standing.FEW),
     "enough again": (0, 100, 95, lambda n: stands(n, Standing.FEW) is Standing.ENOUGH),
@@ -345,6 +356,7 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "held up": (0, S, 500 * MS, is_burst),
     "held up for three periods": (0, 2 * S, 900 * MS, lambda by: is_burst(by, 300 * MS)),
     "slowed": (0, S, 142_857_143, lambda by: slowed(*[100 * MS] * 9, by)),
+    "slowed again": (0, S, 142_857_143, lambda by: slowed(*[100 * MS] * 20, *[300 * MS] * 9, *[100 * MS] * 3, by)),
     "slowed until": (S, 100 * MS, 117_647_058, lambda by: not slowed(*[100 * MS] * 9, 200 * MS, by)),
     "steady for so long": (0, 9, 6, lambda n: slowed(*[100 * MS] * n, S)),
     "steady": (10 * MS, 100 * MS, 66_666_667, lambda by: slowed(*[100 * MS] * 5, *[by] * 4, S)),
@@ -354,6 +366,7 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "periods to tell": (0, 40, 20, lambda n: is_steady(*[10 * MS] * n)),
     "about as long": (0, 10 * MS, 7_500_000, lambda by: is_steady(*[by] * 8, *[10 * MS] * 15, *[20 * MS] * 8)),
     "no longer": (20 * MS, 10 * MS, 12_500_000, lambda by: is_steady(*[MS] * 8, *[10 * MS] * 15, *[by] * 8)),
+    "most about as long": (10, 20, 11, lambda n: is_steady(*[10 * MS] * n, *[25 * MS] * (20 - n))),
     "hardly longer": (99 * MS, 0, 40 * MS, lambda by: is_steady(*[10 * MS] * 18, *[by] * 3)),
     "at once": (0, 9 * MS, MS, lambda by: is_steady(*[by] * 20)),
     # How they are read.

@@ -32,7 +32,7 @@ ROOT: Final = Path(__file__).parents[2]
 _RELAYED: Final = ("tests/simulated", "tests/scenarios", "tests/config", "tests/status")
 ROOMS: Final = {
     "sync": ["tests/sync"],
-    "explain": ["tests/explain", "tests/scenarios", "tests/status"],
+    "explain": ["tests/explain", "tests/scenarios", "tests/status", "tests/cli/test_tap.py"],
     "dataflow": ["tests/dataflow", "tests/sync", *_RELAYED],
     "relay": ["tests/dataflow", *_RELAYED],
     "recordings/bag": ["tests/recordings/bag"],

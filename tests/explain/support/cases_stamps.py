@@ -101,7 +101,7 @@ FOUND = {
     "one clock that stepped": a_silent_group(camera(figures={"stepped": Step(NOW - 12 * S, 2 * S)}), LIDAR),
     "one clock that stepped while the others sent nothing": a_silent_group(
         camera(figures={"stepped": Step(NOW - 12 * S, 2 * S)}),
-        an_input("/lidar", figures={"last_received": NOW - 20 * S}),
+        an_input("/lidar", figures={"last_received": NOW - 20 * S, "flows_since": None}),
     ),
     "the clock of all inputs that stepped": a_group(camera(figures=STEPPED), an_input("/lidar", figures=STEPPED)),
     "this machine's clock that was set": a_group(clock_set=Step(NOW - 12 * S, -2 * S)),
