@@ -87,7 +87,11 @@ def _end(world: World, relay: RelayProcess) -> None:
     scheduler, chance = world.scheduler, world.random
     for service in chance.choices(("status", "pause", "resume", "reload"), k=chance.randrange(6)):
         scheduler.after(chance.randrange(300 * MS), partial(world.ask, service))
-    scheduler.after(chance.randrange(200 * MS), relay.end)
+    at = chance.randrange(MS, 200 * MS)
+    if world.plan.is_managed:
+        # It is served at the moment of the end.
+        scheduler.after(at - MS, partial(world.transit, "deactivate"))
+    scheduler.after(at, relay.end)
 
 
 def _trace(error: BaseException) -> str:
