@@ -263,7 +263,7 @@ class InputObservation:
         usual = mean if len(times) >= _RATE_FROM else 0.0
         if self._is_silent_at(now):
             return 0.0, usual
-        if fed < _RATE_FROM:
+        if fed < _RATE_FROM or not seconds:
             return mean, usual
         if self._first is not None and now - self._first < seconds * _SECOND and times[-1] > self._first:
             # It began within the window and has not had all of it.

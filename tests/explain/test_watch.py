@@ -105,3 +105,11 @@ def test_what_came_before_this_machines_clock_was_set_forward_is_forgotten():
     found = made.facts(GRAPH, now=now + S)
     assert [list(each.figures.received) for each in found.inputs] == [[now - MS]] * 2
     assert found.figures.began == now
+
+
+def test_the_look_that_sees_a_clock_set_forward_gives_the_rate_of_what_came_since():
+    made, now = watch(slop="20ms"), BEGAN + 3600 * S
+    made.add([[]] * 2, [], [InputCounts(0, 0, {}, 0)] * 2, 0, now=BEGAN + S)
+    came = [(now - n * 100 * MS, now - n * 100 * MS) for n in range(9, -1, -1)]
+    made.add([came] * 2, [], [InputCounts(10, 0, {}, 10)] * 2, 0, clock_set=Step(now, 3599 * S), now=now)
+    assert [each.figures.rate_hz for each in made.facts(GRAPH, now=now).inputs] == [10] * 2
