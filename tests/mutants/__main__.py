@@ -5,7 +5,8 @@
 Of each room so many mutants are drawn, or all are taken. For each the tests that run its lines are run, the quickest
 first, in a copy of the tree, until one fails; then the files that hold them, as what a fixture makes once is looked at
 by others. Where only an import runs its lines, all tests of the room are run. A mutant that hangs and one that cannot
-be imported is noticed too. What lives is printed.
+be imported is noticed too. What lives in a room of the relay's is looked for by worlds drawn by seeds. What lives still
+is printed.
 """
 
 import argparse
@@ -27,6 +28,7 @@ from xml.etree import ElementTree as ET
 from coverage import CoverageData
 
 from tests.mutants.mutations import Mutant, mutants_of, mutated
+from tests.simulated.finding import search
 
 ROOT: Final = Path(__file__).parents[2]
 _RELAYED: Final = ("tests/simulated", "tests/scenarios", "tests/config", "tests/status")
@@ -37,6 +39,9 @@ ROOMS: Final = {
     "relay": ["tests/dataflow", *_RELAYED],
     "recordings/bag": ["tests/recordings/bag"],
 }
+_PLAYED: Final = frozenset({"dataflow", "relay"})
+# Each for so many seconds of CPU.
+_PLAYED_S: Final = 30.0
 _LEFT_OUT: Final = "not (ros or browser or peer or process or faults or real_data)"
 _PYTEST: Final = (sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "--no-header", "--tb=no")
 # How pytest ends where a test fails; and where a test is not found, or a conftest.py cannot be imported.
@@ -110,7 +115,7 @@ def tried(room: str, mutants: Sequence[tuple[str, Mutant]], jobs: int) -> Iterat
         def is_noticed(tried: tuple[str, Mutant]) -> bool:
             tree = trees.get()
             try:
-                return _is_noticed(tree, *tried, runs)
+                return _is_noticed(tree, *tried, runs, is_played=room in _PLAYED)
             finally:
                 trees.put(tree)
 
@@ -144,12 +149,14 @@ def _runs(room: str, tree: Path) -> Runs:
     return Runs(tests, seconds)
 
 
-def _is_noticed(tree: Path, path: str, mutant: Mutant, runs: Runs) -> bool:
+def _is_noticed(tree: Path, path: str, mutant: Mutant, runs: Runs, *, is_played: bool) -> bool:
     tests = runs.of(path, mutant)
     source = (ROOT / path).read_text()
     (tree / path).write_text(mutated(source, mutant))
     try:
-        return any(_fail(tree, part, runs) for part in (tests[:_FIRST], tests[_FIRST:], _files(tests)) if part)
+        if any(_fail(tree, part, runs) for part in (tests[:_FIRST], tests[_FIRST:], _files(tests)) if part):
+            return True
+        return is_played and search(tree, seed=mutant.begin, cpu_s=_PLAYED_S).is_found
     finally:
         (tree / path).write_text(source)
 

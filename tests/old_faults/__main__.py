@@ -8,9 +8,7 @@ the minutes of CPU are over. Exits with 1 where a fault is not found.
 """
 
 import argparse
-import os
 import random
-import re
 import shutil
 import subprocess
 import sys
@@ -19,10 +17,11 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Final
 
+from tests.simulated.finding import search
+
 ROOT: Final = Path(__file__).parents[2]
 PATCHES: Final = tuple(sorted(Path(__file__).parent.glob("*.patch")))
 APPLY: Final = ("git", "apply")
-_BROKEN: Final = re.compile(r"seed (\d+) breaks a promise:\n(.*)")
 
 
 def main() -> int:
@@ -43,46 +42,15 @@ def main() -> int:
 
 
 def _is_found(patch: Path, seed: int, cpu_s: float) -> bool:
-    """Play worlds with the fault; one that breaks a promise without it too does not count."""
-    with tempfile.TemporaryDirectory(prefix="syncrelay-fault-") as folder:
+    with tempfile.TemporaryDirectory(prefix="syncrelay-fault-") as name:
+        folder = Path(name)
         for each in ("syncrelay", "tests"):
-            shutil.copytree(ROOT / each, Path(folder, each), ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(ROOT / each, folder / each, ignore=shutil.ignore_patterns("__pycache__"))
         subprocess.run((*APPLY, str(patch)), cwd=folder, check=True)
-        first, left_s = seed, cpu_s
-        while True:
-            output, code, used_s = _played(folder, "--seed", str(seed), "--cpu", str(left_s), "--as-drawn")
-            left_s -= used_s
-            broken = _BROKEN.search(output)
-            if broken is None:
-                ended = "not found" if code == 0 else f"ended with {code}"
-                last = output.strip().rpartition("\n")[2]
-                _say(f"{patch.stem}: {ended} from seed {first} on in {cpu_s - left_s:.0f} s: {last}")
-                return code != 0
-            if _played(str(ROOT), "--seed", broken[1], "--as-drawn")[1] == 0:
-                spent = f"after {cpu_s - left_s:.0f} s of CPU, from {first} on"
-                _say(f"{patch.stem}: found by seed {broken[1]} {spent}: {broken[2]}")
-                return True
-            seed = int(broken[1]) + 1
-            _say(f"{patch.stem}: seed {broken[1]} breaks a promise without it, too")
-            if left_s <= 0:
-                return False
-
-
-def _played(folder: str, *words: str) -> tuple[str, int, float]:
-    """Play worlds with the sources in a folder: what was printed, the exit code and the seconds of CPU."""
-    with tempfile.TemporaryFile() as output:
-        played = subprocess.Popen(
-            (sys.executable, "-m", "tests.simulated", *words),
-            cwd=folder,
-            env={**os.environ, "PYTHONPATH": folder, "PYTHONDONTWRITEBYTECODE": "1"},
-            stdout=output,
-            stderr=subprocess.STDOUT,
-        )
-        # Of several at a time, the CPU of this one.
-        _, status, used = os.wait4(played.pid, 0)
-        played.returncode = os.waitstatus_to_exitcode(status)
-        output.seek(0)
-        return output.read().decode(), played.returncode, used.ru_utime + used.ru_stime
+        found = search(folder, seed=seed, cpu_s=cpu_s)
+    how = "found" if found.is_found else "not found"
+    _say(f"{patch.stem}: {how} after {found.cpu_s:.0f} s of CPU, from {seed} on: {found.told}")
+    return found.is_found
 
 
 def _say(line: str) -> None:
