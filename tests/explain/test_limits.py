@@ -367,6 +367,7 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "about as long": (0, 10 * MS, 7_500_000, lambda by: is_steady(*[by] * 8, *[10 * MS] * 15, *[20 * MS] * 8)),
     "no longer": (20 * MS, 10 * MS, 12_500_000, lambda by: is_steady(*[MS] * 8, *[10 * MS] * 15, *[by] * 8)),
     "most about as long": (10, 20, 11, lambda n: is_steady(*[10 * MS] * n, *[25 * MS] * (20 - n))),
+    "hardly any longer": (0, 9, 3, lambda n: not is_steady(*[10 * MS] * (21 - n), *[99 * MS] * n)),
     "hardly longer": (99 * MS, 0, 40 * MS, lambda by: is_steady(*[10 * MS] * 18, *[by] * 3)),
     "at once": (0, 9 * MS, MS, lambda by: is_steady(*[by] * 20)),
     # How they are read.

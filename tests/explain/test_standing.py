@@ -166,3 +166,4 @@ def test_a_share_is_measured_by_one_clock_alone():
         clock = None if second == 10 else (100 + second) * S
         window.add(counts, second * 4, [Pace(BEGAN, BEGAN + second * S, S // 4)], now=BEGAN + second * S, clock=clock)
         assert window.share().possible <= 4 * second
+        assert window.share().ns <= second * S
