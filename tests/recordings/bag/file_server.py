@@ -117,10 +117,11 @@ def _send(request: BaseHTTPRequestHandler, served: FileServer, content: bytes, f
         return
     if fault == "cut":
         body = body[: len(body) // 2]
+    # Counted first: who has read all of it may look at once.
+    with served.lock:
+        served.sent += len(body)
     with suppress(OSError):
         request.wfile.write(body)
-        with served.lock:
-            served.sent += len(body)
     if fault in ("cut", "endless"):
         _close(request)
 
