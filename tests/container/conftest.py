@@ -15,6 +15,13 @@ from tests.ros.stage import Stage
 collect_ignore_glob = [] if os.environ.get("SYNCRELAY_CONTAINER_TESTS") else ["test_*.py"]
 
 
+@pytest.fixture(autouse=True)
+def _nothing_is_left() -> Iterator[None]:
+    yield
+    if left := docker("ps", "--all", "--quiet").split():
+        docker("rm", "--force", *left)
+
+
 @pytest.fixture
 def relays(tmp_path: Path, ros_domain: int) -> Iterator[Relays]:
     """Starts relays in containers on the test's domain, and removes them."""

@@ -25,8 +25,6 @@ class Project:
     def __init__(self, folder: Path, domain: int) -> None:
         self.environment = {"ROS_DOMAIN_ID": str(domain), "SYNCRELAY_CONFIG": str(folder / "fusion.yaml")}
         self._folder = folder
-        # Other tests run beside this one.
-        self._name = f"--project-name=syncrelay-{domain}"
 
     def up(self, text: str, *services: str) -> dict[str, Container]:
         """Bring services up, by default the default ones, and return their containers, which are healthy."""
@@ -39,7 +37,7 @@ class Project:
         return containers
 
     def compose(self, *words: str) -> str:
-        return docker("compose", f"--file={_FILE}", self._name, *words, environment=self.environment)
+        return docker("compose", f"--file={_FILE}", *words, environment=self.environment)
 
 
 @pytest.fixture
