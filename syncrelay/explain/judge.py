@@ -257,9 +257,8 @@ class Judge:
         told = [each for each in said if each.severity is not Severity.OK and _is_why(each)]
         if any(each.severity >= least for each in told):
             return said
-        cause = next(iter(told), None)
-        if cause is not None:
-            return tuple(replace(each, severity=least) if each is cause else each for each in said)
+        if told:
+            return tuple(replace(each, severity=least) if each is told[0] else each for each in said)
         (few,) = _FEW_SETS.findings(facts)
         over = [each for each in self._causes.values() if each.was_said and _explains(each, few, facts)]
         if over:

@@ -2,6 +2,7 @@
 
 import os
 import re
+import resource
 import subprocess
 import sys
 import tempfile
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 _ROOT: Final = Path(__file__).parents[2]
+_MOST_S: Final = 1200
 _BROKEN: Final = re.compile(r"seed (\d+) breaks a promise:\n(.*)")
 
 
@@ -32,7 +34,7 @@ def search(folder: Path, *, seed: int, cpu_s: float) -> Search:
         found = _BROKEN.search(output)
         if found is None:
             last = output.strip().rpartition("\n")[2]
-            return Search(code != 0, f"ended with {code}: {last}" if code else last, used)
+            return Search(is_found=code != 0, told=f"ended with {code}: {last}" if code else last, cpu_s=used)
         if _played(_ROOT, "--seed", found[1], "--as-drawn")[1] == 0:
             return Search(is_found=True, told=f"seed {found[1]}: {found[2]}", cpu_s=used)
         seed, broken_by_ours = int(found[1]) + 1, broken_by_ours + 1
@@ -50,6 +52,8 @@ def _played(folder: Path, *words: str) -> tuple[str, int, float]:
             stdout=output,
             stderr=subprocess.STDOUT,
         )
+        # A world that turns without end never looks at its clock.
+        resource.prlimit(played.pid, resource.RLIMIT_CPU, (_MOST_S, _MOST_S))
         # Of several at a time, the CPU of this one.
         _, status, used = os.wait4(played.pid, 0)
         played.returncode = os.waitstatus_to_exitcode(status)
