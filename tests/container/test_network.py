@@ -8,12 +8,7 @@ from tests.container.stages import CONFIG, assert_relayed
 pytestmark = pytest.mark.container
 
 
-def test_a_relay_in_a_container_serves_nodes_on_the_host(relays, host):
-    relays.run(CONFIG, "--network=host")
-    assert_relayed(host)
-
-
-def test_it_serves_them_with_nothing_writable_no_capability_and_a_user_that_nobody_knows(relays, host):
+def test_it_serves_nodes_on_the_host_with_nothing_writable_no_capability_and_a_user_that_nobody_knows(relays, host):
     relay = relays.run(CONFIG, "--network=host", "--user=4711:4712", *HARDENED)
     assert_relayed(host)
     relay.wait_for_health("healthy")

@@ -1,7 +1,6 @@
 """The services and parameters of the relay's node: called and read by a process of their own."""
 
 import os
-import re
 import signal
 from importlib.metadata import version
 
@@ -22,32 +21,15 @@ _REAR = {"policy": "exact_time", "topics": inputs(_PAIR, qos=LOSSLESS)}
 _OFFERED = [f"/syncrelay/{name}" for name in ("pause", "reload", "resume", "status")]
 
 
-def _file(**groups) -> str:
-    return config(groups, metrics=ANY_PORT)
-
-
 def test_a_reload_by_service_says_what_changed_and_parameters_tell_what_runs(stage: Stage):
     file, caller = ReloadedFile(stage, front=_FRONT), stage.caller()
-    file.write(_file(front=_FRONT, rear=_REAR))
+    file.write(config({"front": _FRONT, "rear": _REAR}, metrics=ANY_PORT))
     assert caller.call("reload") == (True, "reloaded: 1 group unchanged; started rear")
     assert caller.get("config", "version", "groups") == [[str(file.path)], version("syncrelay"), ["front", "rear"]]
     for name, value in (("config", ["other.yaml"]), ("version", "0"), ("groups", ["front"])):
         successful, why = caller.set(name, value)
         assert not successful
         assert name in why
-    file.write(_file(front={**_FRONT, "slop": "30ms"}))
-    assert caller.call("reload") == (True, "reloaded: 0 groups unchanged; rebuilt front; ended rear")
-    assert caller.get("groups") == [["front"]]
-    file.write(_file(front={**_FRONT, "slopp": "1ms"}))
-    success, why = caller.call("reload")
-    assert not success
-    assert "groups.front.slopp: unknown key, did you mean `slop`?" in why
-    assert why in file.relay.stderr
-    success, text = caller.call("status")
-    assert success
-    assert text.startswith("/syncrelay: ")
-    # What it says of it hangs on how long there was no set.
-    assert re.search(r"front: [A-Z]+", text), text
     wait_until(lambda: set(caller.services()) >= set(_OFFERED), "all services in the graph")
 
 
