@@ -1,0 +1,96 @@
+"""Draws faults by seed, and prints how each kind is told: `python -m tests.bank --draws 2000 --seed 1`.
+
+`--show SEED` prints what a draw is, and what was said when.
+"""
+
+import argparse
+import sys
+import time
+from collections import Counter, defaultdict
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from typing import NamedTuple
+
+from tests.bank.kinds import KINDS
+from tests.bank.play import Score, described, drawn, play
+
+
+class Row(NamedTuple):
+    """What is kept of a draw."""
+
+    seed: int
+    kind: str
+    score: Score
+    why: str
+    cure: str
+    lasted: float
+
+
+def row(kinds: tuple[str, ...], n_faults: int, seed: int) -> Row:
+    result = play(drawn(seed, kinds, n_faults))
+    first = result.first[1].code.value if result.first else ""
+    why = result.why or ("" if result.score is Score.TOLD else first)
+    return Row(seed, " + ".join(result.drawn.kinds) or "well", result.score, why, result.cure or "", result.lasted)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="tests.bank", description=__doc__)
+    parser.add_argument("--draws", type=int, default=500)
+    parser.add_argument("--seed", type=int, default=1, help="the first seed")
+    parser.add_argument("--faults", type=int, choices=[0, 1, 2], default=1)
+    parser.add_argument("--kinds", help="of these only, separated by commas", default=",".join(KINDS))
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--show", type=int, help="print one draw, and what was said of it")
+    asked = parser.parse_args()
+    kinds = tuple(asked.kinds.split(","))
+    if asked.show is not None:
+        draw = drawn(asked.show, kinds, asked.faults)
+        result = play(draw)
+        _say(described(draw), *(f"  {second:6.2f} {text}" for second, text in result.said))
+        _say(f"{result.score.value} {result.why}; cure: {result.cure or 'well'}; logged at {result.logged}")
+        return 0
+    began = time.monotonic()
+    with ProcessPoolExecutor(asked.jobs) as pool:
+        rows = list(
+            pool.map(partial(row, kinds, asked.faults), range(asked.seed, asked.seed + asked.draws), chunksize=8)
+        )
+    _table(rows)
+    took = time.monotonic() - began
+    _say(f"{len(rows)} draws in {took:.0f} s, {1000 * took / len(rows):.0f} ms each")
+    return 0
+
+
+def _table(rows: list[Row]) -> None:
+    kinds = defaultdict(list)
+    for each in rows:
+        kinds[each.kind].append(each)
+    names = sorted(kinds) if " + " not in "".join(kinds) else []
+    for kind in names:
+        _say(_counted(kind, kinds[kind]))
+    _say(_counted("all", rows))
+    offered = [each for each in rows if each.score in (Score.TOLD, Score.LATE) and each.cure != "nothing offered"]
+    wrong = [each for each in offered if each.cure]
+    fails = "; ".join(f"{each.seed} {each.kind}: {each.cure}" for each in wrong[:12])
+    _say(f"of {len(offered)} that were told, what was offered fails in {len(wrong)}. {fails}")
+    if rows[0].kind == "well":
+        _say(f"longest false warning: {max(each.lasted for each in rows):.0f} s")
+
+
+def _counted(kind: str, rows: list[Row]) -> str:
+    scores = Counter(each.score for each in rows)
+    wrong = [each for each in rows if each.score is not Score.TOLD]
+    whys = Counter(
+        f"{each.score.value} {each.why}".strip() for each in wrong if each.score is not Score.NOTHING
+    ).most_common(6)
+    figures = " ".join(f"{scores[each]:5d}" for each in Score)
+    seeds = ",".join(str(each.seed) for each in wrong[:6])
+    return f"{kind:20s} {len(rows):5d} {scores[Score.TOLD] / len(rows):5.0%} {figures}  {dict(whys)} {seeds}"
+
+
+def _say(*lines: str) -> None:
+    sys.stdout.write("\n".join(lines) + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,330 @@
+"""Draws a rig and its faults by a seed, plays it in virtual time, and compares what was said with what is true."""
+
+import contextlib
+import random
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from typing import Any, Final
+
+import numpy as np
+
+from syncrelay.config import ConfigError, GroupConfig
+from syncrelay.explain import Code, EngineDriver, Finding, GroupFacts, Severity, explanation, with_ok
+from syncrelay.explain.finding_log import Remark
+from syncrelay.sync import Match, Message
+from tests.bank.kinds import KINDS, Kind, Truth
+from tests.bank.rig import LONGEST_S, Flow, Rig, S, a_rig, spans
+from tests.explain.scenario import BEGAN, Source, group_of, run
+
+IN_TIME_S: Final = 7.0
+_GRACE_S: Final = 15.0
+_SIZE: Final = 0.2
+_HEALTHY_S: Final = 60.0
+# A standstill of the relay is truly told, for as long as it is seen.
+_STALL_TOLD_S: Final = 12.0
+_NOT_YET: Final = "not known yet"
+_FIGURE: Final = re.compile(r"(\d+(?:\.\d+)?) ?(ns|us|ms|s|min|h|days|years|ppm|Hz|times|%)(?![\w/])")
+_OF: Final = re.compile(r"(\d+) of (?:the last )?(\d+)")
+_NS: Final = {
+    "ns": 1,
+    "us": 1e3,
+    "ms": 1e6,
+    "s": 1e9,
+    "min": 60e9,
+    "h": 3600e9,
+    "days": 86400e9,
+    "years": 365.2425 * 86400e9,
+}
+_OFFER: Final = re.compile(r"`(?P<key>\w+): (?P<value>[^`]+)`(?: at (?P<topic>/\w+))?")
+
+
+class Score(Enum):
+    """How well the first sentence fits; of a rig without a fault, nothing is what it should be."""
+
+    TOLD = "told"
+    LATE = "late"
+    HALF = "half"
+    OTHER = "other"
+    NOTHING = "nothing"
+
+
+@dataclass
+class Drawn:
+    """A rig with its faults."""
+
+    seed: int
+    kinds: tuple[str, ...]
+    rig: Rig
+    truths: tuple[Truth, ...]
+    seconds: float
+    looks: list[float]
+
+    @property
+    def sources(self) -> list[Source]:
+        return [
+            Source(
+                each.topic,
+                each.hz,
+                node=each.endpoint.node,
+                required=each.required,
+                messages=each.messages,
+                topic_options=each.options,
+            )
+            for each in self.rig.flows
+        ]
+
+    @property
+    def config(self) -> GroupConfig:
+        return group_of(self.sources, self.rig.options)
+
+
+@dataclass
+class Result:
+    """What came of a draw: `first` is the first sentence that is neither well nor about a stall of the relay."""
+
+    drawn: Drawn
+    score: Score
+    why: str = ""
+    first: tuple[float, Finding] | None = None
+    said: list[tuple[float, str]] = field(default_factory=list)
+    lasted: float = 0.0
+    """For how many seconds there was a warning, of a rig without a fault."""
+    cure: str | None = None
+    """What is wrong with what was suggested."""
+    logged: float | None = None
+
+
+def drawn(seed: int, kinds: Sequence[str], n_faults: int) -> Drawn:
+    """Draw what a seed gives."""
+    chance = random.Random(f"bank {seed} {n_faults}")
+    if not n_faults:
+        rig = a_rig(
+            chance,
+            chance.choice(["approximate_time", "approximate_time_eager", "exact_time", "latest_time"]),
+            seconds=_HEALTHY_S,
+        )
+        _stall(rig)
+        return Drawn(seed, (), rig, (), _HEALTHY_S, _looks(chance, _HEALTHY_S))
+    names = tuple(chance.sample(list(kinds), min(n_faults, len(kinds))))
+    while True:
+        rig, truths = _faulty(chance, [KINDS[each] for each in names])
+        if truths:
+            break
+    if "stalls" not in names:
+        _stall(rig)
+    late = sum(end - begin for begin, end in rig.stops)
+    truths = tuple(replace(each, seen=each.seen + late) for each in truths)
+    seconds = max(each.seen for each in truths) + IN_TIME_S + _GRACE_S
+    return Drawn(seed, names, rig, truths, seconds, _looks(chance, seconds))
+
+
+def _faulty(chance: random.Random, kinds: list[Kind]) -> tuple[Rig, tuple[Truth, ...]]:
+    policy = chance.choice(
+        [each for each in kinds[0].policies if all(each in of.policies for of in kinds)] or ["approximate_time"]
+    )
+    rig = a_rig(chance, policy, same_rate=any(each.same_rate for each in kinds))
+    truths = []
+    for kind in kinds:
+        rig.begin = 0.0
+        if chance.random() < kind.midway:
+            rig.begin = 6 + 10 * chance.random() + 8 * rig.slowest / S
+        truth = kind.draw(rig)
+        if truth is None or truth.seen + IN_TIME_S > LONGEST_S - 5:
+            return rig, ()
+        truths.append(truth)
+    return rig, tuple(truths)
+
+
+def _stall(rig: Rig) -> None:
+    chance = rig.chance
+    if chance.random() < 0.15:
+        begin = chance.uniform(1, 20)
+        rig.stops.append((begin, begin + chance.uniform(0.1, 1.5)))
+
+
+def _looks(chance: random.Random, seconds: float) -> list[float]:
+    at, looks = chance.uniform(0.02, 1), []
+    while at < seconds:
+        looks.append(at)
+        at += 1 + chance.uniform(0, 0.06)
+    return looks
+
+
+class _HeardEnoughError(Exception):
+    pass
+
+
+def play(draw: Drawn) -> Result:
+    """Play a draw until its first sentence, or to its end."""
+    result = Result(draw, Score.NOTHING)
+
+    def hears(second: float, facts: GroupFacts, found: tuple[Finding, ...], remarks: list[Remark]) -> None:
+        shown = explanation(with_ok(facts, found))
+        text = _sentence(shown)
+        if not result.said or result.said[-1][1] != text:
+            result.said.append((second, text))
+        if result.logged is None and any(each.severity is not Severity.OK for each in remarks):
+            result.logged = second
+        if shown.severity is Severity.OK or shown.code is Code.STARTING or _is_of_stall(draw, shown, second):
+            return
+        result.lasted += 1.03
+        result.first = result.first or (second, shown)
+        if draw.truths and not _is_open(facts, shown):
+            result.first = second, shown
+            raise _HeardEnoughError
+
+    with contextlib.suppress(_HeardEnoughError):
+        run(
+            *draw.sources,
+            seconds=int(draw.seconds) + 1,
+            options=draw.rig.options,
+            stops=draw.rig.stops,
+            publishers=_publishers(draw.rig.flows),
+            looks=draw.looks,
+            hears=hears,
+        )
+    if not draw.truths:
+        result.score = Score.OTHER if result.first else Score.TOLD
+    elif result.first is not None:
+        _judge(result)
+    return result
+
+
+def _is_open(facts: GroupFacts, finding: Finding) -> bool:
+    """Whether it says itself that more will be known soon, or what it suggests is still to be tried."""
+    awaits = facts.suggester is not None and facts.suggester.awaits((finding.code, finding.input))
+    return _NOT_YET in _sentence(finding) or awaits
+
+
+def _publishers(flows: Sequence[Flow]):
+    by_topic = defaultdict(list)
+    for each in flows:
+        by_topic[each.topic].append(each)
+    return lambda topic, second: tuple(each.endpoint for each in by_topic[topic] if each.shown(second))
+
+
+def _is_of_stall(draw: Drawn, finding: Finding, second: float) -> bool:
+    if finding.code is not Code.TOO_SLOW or "stalls" in draw.kinds:
+        return False
+    return any(end - begin > 0.4 and begin <= second < end + _STALL_TOLD_S for begin, end in draw.rig.stops)
+
+
+def _sentence(finding: Finding) -> str:
+    return f"{finding.code.value}: {finding.text}" + (f"; {finding.suggestion}" if finding.suggestion else "")
+
+
+def _judge(result: Result) -> None:
+    assert result.first is not None
+    second, finding = result.first
+    scores = [_fit(result.drawn, truth, second, finding) for truth in result.drawn.truths]
+    result.score, result.why = min(scores, key=lambda each: list(Score).index(each[0]))
+    truth = result.drawn.truths[scores.index((result.score, result.why))]
+    if result.score in (Score.TOLD, Score.LATE) and truth.moments:
+        result.cure = _wrong_with_cure(result.drawn, finding)
+
+
+def _fit(draw: Drawn, truth: Truth, second: float, finding: Finding) -> tuple[Score, str]:
+    topics = [topic.topic for topic in draw.config.topics]
+    if finding.code.value not in truth.codes:
+        return Score.OTHER, finding.code.value
+    about = {topics[index] for index in finding.about} or set(re.findall(r"/\w+", _sentence(finding)))
+    text = _sentence(finding)
+    if truth.topics and not about & truth.topics:
+        return Score.HALF, "input"
+    if truth.sizes and not any(_is_near(each, size) for each in _figures(text, truth.unit) for size in truth.sizes):
+        return Score.HALF, "size"
+    if truth.says and not any(word in text for word in truth.says):
+        return Score.HALF, "words"
+    return (Score.TOLD, "") if second <= truth.seen + IN_TIME_S else (Score.LATE, f"{second - truth.seen:.0f} s")
+
+
+def _is_near(one: float, other: float) -> bool:
+    return abs(one - other) <= _SIZE * abs(other) + 1e-12
+
+
+def _figures(text: str, unit: str) -> list[float]:
+    if unit == "share":
+        shares = [int(one) / max(1, int(all_)) for one, all_ in _OF.findall(text)]
+        shares += [float(number) / 100 for number, of in _FIGURE.findall(text) if of == "%"]
+        return [each for one in shares for each in (one, 1 - one)]
+    found = ((float(number), of) for number, of in _FIGURE.findall(text))
+    return [
+        number * _NS[of] if unit == "ns" else number
+        for number, of in found
+        if (of in _NS if unit == "ns" else of == unit)
+    ]
+
+
+def _wrong_with_cure(draw: Drawn, finding: Finding) -> str | None:
+    """Say what is wrong with the group, had it what was suggested; None if all is well."""
+    text = (
+        (finding.suggestion or "").split(", or ")[0].split("; ")[0]
+        if finding.code is not Code.OTHER_CLOCK
+        else finding.suggestion or ""
+    )
+    offers = list(_OFFER.finditer(text))
+    if not offers:
+        return "nothing offered"
+    group: dict[str, Any] = {}
+    topics: dict[str, dict[str, Any]] = defaultdict(dict)
+    for each in offers:
+        value: Any = int(each["value"]) if each["value"].isdecimal() else each["value"]
+        if each["topic"] and each["key"] in ("offset", "stamp"):
+            topics[each["topic"]][each["key"]] = value
+        else:
+            group[each["key"]] = value
+    sources = [replace(each, topic_options={**each.topic_options, **topics[each.topic]}) for each in draw.sources]
+    options = {**draw.rig.options, **group}
+    if "policy" in group:
+        options = {key: value for key, value in options.items() if key in ("policy", "queue_size", "slop", "max_wait")}
+    try:
+        config = group_of(sources, options)
+    except ConfigError as error:
+        return f"not a valid file: {error}"
+    sets = list(_sets_of(draw, config))
+    possible = len(spans(draw.rig, by=lambda each: each.true))
+    # By the truth, what was measured together lies as near as it did in the rig that was well.
+    most = max(draw.rig.slop, draw.rig.width)
+    right = sum(span <= 1.05 * most for span in sets)
+    if len(sets) < 0.9 * possible:
+        return f"{len(sets)} of {possible} sets"
+    return None if right >= 0.98 * len(sets) else f"{right} of {len(sets)} sets are of one moment"
+
+
+def _sets_of(draw: Drawn, config: GroupConfig) -> Iterator[int]:
+    """Give the true span of each set that an engine gives of all messages."""
+    came = [
+        (int(at), index, int(stamp), int(true))
+        for index, each in enumerate(draw.rig.flows)
+        for at, stamp, true in zip(each.received, each.stamps, each.true, strict=True)
+    ]
+    given: list[int] = []
+
+    def take(outcomes, _now) -> None:
+        for each in outcomes:
+            if isinstance(each, Match):
+                true = [message.payload for message in each.messages if message is not None]
+                given.append(max(true) - min(true))
+
+    driver = EngineDriver(config, take)
+    for at, index, stamp, true in sorted(came):
+        driver.add(Message(index, stamp, true), now=BEGAN + at)
+    driver.finish(BEGAN + round(draw.seconds * S))
+    yield from given
+
+
+def described(draw: Drawn) -> str:
+    """Say what a draw is."""
+    lines = [f"seed {draw.seed}: {' and '.join(draw.kinds) or 'well'}, from {draw.rig.begin:.1f} s; {draw.rig.options}"]
+    lines += [f"  the relay stands still from {begin:.1f} to {end:.1f} s" for begin, end in draw.rig.stops]
+    for each in draw.rig.flows:
+        first = ", ".join(f"{(stamp - BEGAN) / S:.6f}" for stamp in each.stamps[:3])
+        lines.append(
+            f"  {each.topic} at {each.hz:.3g} Hz, {each.lateness / 1e6:.3g} ms late, jitter {each.jitter / 1e6:.3g} ms"
+            f"{'' if each.required else ', optional'}; stamps {first} ... at {np.round(each.true[:1] / S, 6)}"
+        )
+    lines += [f"  true: {each}" for each in draw.truths]
+    return "\n".join(lines)
