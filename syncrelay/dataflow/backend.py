@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from typing import Any, Final, Protocol, TypeAlias
 
+from syncrelay.dataflow.deliveries import Deliveries
+
 Content: TypeAlias = bytes | memoryview
 """A message's bytes, to read fields from at once; they are not kept."""
 
@@ -47,6 +49,10 @@ class Source(Protocol):
 
     def take(self) -> Payload | None:
         """Take its oldest message, so that one less is pending; None if there is none after all."""
+        ...
+
+    def deliveries(self) -> Sequence[Deliveries]:
+        """Give what came of each publisher; of none where the middleware does not number messages."""
         ...
 
 

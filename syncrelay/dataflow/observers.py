@@ -1,10 +1,11 @@
 """What the relay observes of itself: standstills, waits, losses, and clocks that step or stop. Times in nanoseconds."""
 
 from collections import deque
-from collections.abc import Hashable
-from typing import Final
+from collections.abc import Hashable, Sequence
+from typing import Final, NamedTuple
 
-from syncrelay.explain import STEP_NS, ClockState, Standstill, Step
+from syncrelay.dataflow.deliveries import MOST_PUBLISHERS, Deliveries
+from syncrelay.explain import STEP_NS, ClockState, Endpoint, Sender, Standstill, Step
 from syncrelay.runtime import SYSTEM, Runtime
 
 # What was lost, and what had to wait, is reported for the last ten evaluations.
@@ -19,6 +20,9 @@ _DISCOVERED_AT_LATEST_S: Final = 10.0
 # A clock that is set moves at once; one that is slewed only runs faster or slower.
 _STEP_NS: Final = 100_000_000
 _READINGS: Final = 3
+_SECOND: Final = 1_000_000_000
+# The rate at which a publisher sends is that between so many evaluations, 3 s: a change shows soon.
+_POINTS: Final = 4
 _TOLD_NS: Final = 30_000_000_000
 # A /clock at 1 Hz stands still for a second between two ticks.
 _CLOCK_STOPPED_NS: Final = 2_500_000_000
@@ -101,6 +105,134 @@ class Losses:
     def recent(self) -> int:
         """How many were lost in the last evaluations."""
         return self._totals[-1] - self._totals[0] if self._totals else 0
+
+
+class _Step(NamedTuple):
+    """What came of a publisher since the evaluation before."""
+
+    sent: int
+    delivered: int
+    longest_gap: int = 0
+    way: int | None = None
+
+
+_NOTHING: Final = _Step(0, 0)
+
+
+class _Publisher:
+    """One publisher, evaluation by evaluation."""
+
+    def __init__(self) -> None:
+        self.node = "a publisher that left"
+        self.sent = self.delivered = 0
+        self._last: Deliveries | None = None
+        self._steps: deque[_Step] = deque(maxlen=_RECENT)
+        self._points: deque[tuple[int, int]] = deque(maxlen=_POINTS)
+
+    def observe(self, now: Deliveries | None) -> None:
+        """Take its counts, None where there are none."""
+        before, self._last = self._last, now
+        step = _NOTHING
+        if now is not None:
+            # One that is counted anew restarted, or the subscription was made anew.
+            if before is not None and (before.first != now.first or before.newest > now.newest):
+                before = None
+            if before is None:
+                self._points.clear()
+            # Without a gid its numbers may be those of several, until the next evaluation has seen that they rise.
+            if before is not None or now.gid is not None:
+                sent, delivered = (before.sent, before.delivered) if before is not None else (0, 0)
+                step = _Step(now.sent - sent, now.delivered - delivered, now.longest_gap, now.least_way)
+            if not self._points or self._points[-1][0] != now.newest:
+                self._points.append((now.newest, now.published))
+        self._steps.append(step)
+        self.sent += step.sent
+        self.delivered += step.delivered
+
+    @property
+    def is_recent(self) -> bool:
+        """Whether it is counted now, or was within the last evaluations."""
+        return self._last is not None or any(step.sent for step in self._steps)
+
+    @property
+    def _rate(self) -> float | None:
+        if len(self._points) < 2:  # noqa: PLR2004  two make a period
+            return None
+        (first, began), (last, ended) = self._points[0], self._points[-1]
+        # Whoever publishes may give any times.
+        return min((last - first) * _SECOND / (ended - began), _SECOND) if ended > began else None
+
+    def sender(self) -> Sender:
+        """Give it as a value."""
+        steps = self._steps
+        return Sender(
+            self.node,
+            sent=sum(each.sent for each in steps),
+            delivered=sum(each.delivered for each in steps),
+            longest_gap=max((each.longest_gap for each in steps), default=0),
+            sent_hz=self._rate,
+            way=min((each.way for each in steps if each.way is not None), default=None),
+            sent_in_all=self.sent,
+            delivered_in_all=self.delivered,
+        )
+
+
+class Senders:
+    """The nodes that publish a topic: how many messages each sent, and how many of them came.
+
+    Where messages do not say whose they are, they are counted while the graph shows one publisher alone.
+    """
+
+    def __init__(self) -> None:
+        self._publishers: dict[bytes, _Publisher] = {}
+        self._gone: dict[str, tuple[int, int]] = {}
+
+    def observe(self, deliveries: Sequence[Deliveries], publishers: Sequence[Endpoint]) -> None:
+        """Take what came of each publisher, and what the graph shows of them."""
+        alone = publishers[0].gid if len(publishers) == 1 else b""
+        came = {alone if each.gid is None else each.gid: each for each in deliveries}
+        came.pop(b"", None)
+        for gid in [*came, *(each for each in self._publishers if each not in came)]:
+            self._publishers.setdefault(gid, _Publisher()).observe(came.get(gid))
+        for each in publishers:
+            if each.gid in self._publishers:
+                self._publishers[each.gid].node = each.node
+        for gid in [gid for gid, each in self._publishers.items() if not each.is_recent]:
+            self._forget(self._publishers.pop(gid))
+
+    def _forget(self, gone: _Publisher) -> None:
+        """Keep the totals of its node, as long as there are few."""
+        sent, delivered = self._gone.pop(gone.node, (0, 0))
+        self._gone[gone.node] = sent + gone.sent, delivered + gone.delivered
+        if len(self._gone) > MOST_PUBLISHERS:
+            del self._gone[next(iter(self._gone))]
+
+    @property
+    def recent(self) -> tuple[Sender, ...]:
+        """What is known of each node; several publishers of one node, as after its restart, are one."""
+        found = {
+            node: Sender(node, 0, 0, sent_in_all=sent, delivered_in_all=came)
+            for node, (sent, came) in self._gone.items()
+        }
+        for each in self._publishers.values():
+            sender = each.sender()
+            before = found.get(sender.node)
+            found[sender.node] = sender if before is None else _together(before, sender)
+        return tuple(found.values())
+
+
+def _together(one: Sender, other: Sender) -> Sender:
+    rates = [each.sent_hz for each in (one, other) if each.sent and each.sent_hz is not None]
+    return Sender(
+        one.node,
+        sent=one.sent + other.sent,
+        delivered=one.delivered + other.delivered,
+        longest_gap=max(one.longest_gap, other.longest_gap),
+        sent_hz=sum(rates) if rates else None,
+        way=min((each.way for each in (one, other) if each.way is not None), default=None),
+        sent_in_all=one.sent_in_all + other.sent_in_all,
+        delivered_in_all=one.delivered_in_all + other.delivered_in_all,
+    )
 
 
 class Discovery:

@@ -19,6 +19,7 @@ from syncrelay.explain.facts import (
     InputGraph,
     Pause,
     Refusal,
+    Sender,
     Standstill,
 )
 from syncrelay.explain.figures import GroupFigures, InputFigures
@@ -70,6 +71,7 @@ __all__ = [
     "RecentDrop",
     "RecentSet",
     "Refusal",
+    "Sender",
     "SentSets",
     "Severity",
     "Share",

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple, TypedDict
 
 from syncrelay.config import Distance, Tolerance
-from syncrelay.config.profile import Mismatch
+from syncrelay.config.profile import Mismatch, Profile
 from syncrelay.explain.clocks import Step
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.standing import Standing
@@ -23,13 +23,40 @@ _FOUND_AT_ONCE: Final = 2 * _SECOND
 class Endpoint:
     """A publisher of an input or a subscriber of an output: its node, its type, why it does not connect to us.
 
-    `is_named` is False where DDS has found the endpoint but not yet its node; `node` then says so.
+    `is_named` is False where DDS has found the endpoint but not yet its node; `node` then says so. `gid` tells it from
+    all others, empty where nothing does.
     """
 
     node: str
     type: str
     mismatch: Mismatch | None = None
     is_named: bool = True
+    gid: bytes = field(default=b"", compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Sender:
+    """A node that publishes an input, and how many of its messages came lately, by the numbers that they have.
+
+    What it published before the relay had found it is not counted. `longest_gap` is the most that did not come in a
+    row, `sent_hz` the rate at which it sent the last ones by its own clock, None of too few, `way` the least time in
+    nanoseconds from their publication to their receipt, by two clocks if it runs on another machine. `sent_in_all` and
+    `delivered_in_all` are counted since the relay follows the topic.
+    """
+
+    node: str
+    sent: int
+    delivered: int
+    longest_gap: int = 0
+    sent_hz: float | None = None
+    way: int | None = None
+    sent_in_all: int = 0
+    delivered_in_all: int = 0
+
+    @property
+    def lost(self) -> int:
+        """How many did not come."""
+        return self.sent - self.delivered
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,10 +103,11 @@ class InputGraph:
     `name` is the topic's in the graph, `output` that under which its messages leave, `not_importable` says why its type
     cannot be used here, `not_readable` why the stamp or key that the file names cannot be read from it, `refusal` what
     DDS does not make or publish for it, `alike` are topics of the graph that may have been meant. DDS recently lost
-    `lost` messages on the way, and `lost_in_all` since the relay follows the topic. `type_from` is the publisher, or
-    one of several, whose type was taken because the file has none, None while there is none. `rivals` are others that
-    publish its output, seen so without a break since `rivals_since`. `largest` is the size of the largest message in
-    bytes, 0 where nobody measures it.
+    `lost` messages on the way, and `lost_in_all` since the relay follows the topic. `senders` are those that publish
+    it, by their nodes, none where messages do not say whose they are. `profile` is what the relay subscribes with.
+    `type_from` is the publisher, or one of several, whose type was taken because the file has none, None while there is
+    none. `rivals` are others that publish its output, seen so without a break since `rivals_since`. `largest` is the
+    size of the largest message in bytes, 0 where nobody measures it.
     """
 
     name: str
@@ -96,6 +124,20 @@ class InputGraph:
     rivals_since: int = 0
     largest: int = 0
     type_from: Endpoint | None = None
+    senders: tuple[Sender, ...] = ()
+    profile: Profile | None = None
+
+    @property
+    def undelivered(self) -> int:
+        """How many messages did not come lately: by their numbers, or else by what DDS reports."""
+        return sum(each.lost for each in self.senders) if any(each.sent for each in self.senders) else self.lost
+
+    @property
+    def sent_hz(self) -> float | None:
+        """The rate at which its publishers sent the last messages; None where that is not known."""
+        sending = [each for each in self.senders if each.sent]
+        rates = [each.sent_hz for each in sending if each.sent_hz is not None]
+        return sum(rates) if rates and len(rates) == len(sending) else None
 
 
 def serving(graph: InputGraph, type_name: str | None) -> Sequence[Endpoint]:

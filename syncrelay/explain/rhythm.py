@@ -46,7 +46,7 @@ _STEADY: Final = 0.25
 _ODD: Final = 10
 # It has slowed down below the first share of its steady pace, until it is above the second.
 _SLOWED: Final = 0.7
-_RECOVERED: Final = 0.85
+RECOVERED: Final = 0.85
 
 
 # A steady input: of this many last periods, or at least half as many, most are about as long as their median ...
@@ -108,12 +108,12 @@ class PaceWatch:
         if not self.now_hz:
             return None
         if self.slowed_from is not None:
-            return self.slowed_from if self.now_hz < _RECOVERED * self.slowed_from else None
+            return self.slowed_from if self.now_hz < RECOVERED * self.slowed_from else None
         if len(self._paces) < _FEWEST_PACES or self.now_hz >= _SLOWED * max(self._paces):
             return None
         usual = median(self._paces)
         odd = len(self._paces) // _ODD
         steady = sorted(self._paces)[odd : len(self._paces) - odd]
-        if steady[-1] - steady[0] > 2 * _STEADY * usual or self.now_hz >= _RECOVERED * steady[0]:
+        if steady[-1] - steady[0] > 2 * _STEADY * usual or self.now_hz >= RECOVERED * steady[0]:
             return None
         return usual if self.now_hz < _SLOWED * usual else None

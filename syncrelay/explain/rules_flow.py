@@ -5,13 +5,17 @@ from itertools import pairwise
 from typing import Final
 
 from syncrelay.explain import words
-from syncrelay.explain.facts import GroupFacts, InputFacts
+from syncrelay.explain.facts import GroupFacts, InputFacts, InputGraph, Sender
 from syncrelay.explain.findings import SECOND, Fault, Found, nodes
+from syncrelay.explain.rhythm import RECOVERED
 
 _TOO_SLOW: Final = 500_000_000
 # An input too slow to send this many messages in the time of a burst cannot show one.
 _SHOWN_BY: Final = 5
 _PAUSE_PERIODS: Final = 3
+_CHECK_NETWORK: Final = "check the network and the CPU load"
+# As many as Fast DDS keeps with keep_all.
+_MOST_KEPT: Final = 5000
 # Reliable publishers send what the relay missed in a standstill again within this time.
 _SENT_AGAIN: Final = 4 * SECOND
 
@@ -56,17 +60,44 @@ def _overlap(held_up: Sequence[Sequence[tuple[int, int]]]) -> bool:
 
 
 def messages_lost(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
-    """Find messages that DDS itself lost before they came here."""
-    share = facts.figures.share
+    """Find messages that were published and did not come here: by their numbers, or else as DDS reports it."""
+    graph, share = an_input.graph, facts.figures.share
     # Each cost a set at most: they are the cause where they account for most of those that are missing.
-    missing, cost = share.possible - share.left, sum(each.graph.lost for each in facts.inputs if each.required)
-    if an_input.graph.lost:
-        messages = "1 message" if an_input.graph.lost == 1 else f"{an_input.graph.lost} messages"
+    missing, cost = share.possible - share.left, sum(each.graph.undelivered for each in facts.inputs if each.required)
+    explains = an_input.required and 0 < missing <= 2 * cost
+    losing = [each for each in graph.senders if each.lost]
+    if losing:
+        lost = " and ".join(f"{each.lost} of {each.sent} messages from {each.node}" for each in losing)
+        why, cure = _why_lost(graph, losing)
+        yield Fault(f"{lost} did not arrive on {an_input.name} in the last 10 s: {why}", cure, explains=explains)
+    elif graph.undelivered:
+        messages = "1 message" if graph.lost == 1 else f"{graph.lost} messages"
         yield Fault(
             f"DDS lost {messages} of {an_input.name} on the way here in the last 10 s",
-            f"check the network and the CPU load; if {nodes(an_input)} is reliable, `qos: auto` makes it resend them",
-            explains=an_input.required and 0 < missing <= 2 * cost,
+            f"{_CHECK_NETWORK}; if {nodes(an_input)} is reliable, `qos: auto` makes it resend them",
+            explains=explains,
         )
+
+
+def _why_lost(graph: InputGraph, losing: Sequence[Sender]) -> tuple[str, str]:
+    """Say why messages did not arrive, as far as it is known, and what to do."""
+    names, profile = " and ".join(each.node for each in losing), graph.profile
+    # DDS reports what it lost on the way, and not what a full history gave up for newer messages.
+    if profile is not None and profile.history == "keep_last" and 2 * graph.lost < graph.undelivered:
+        depth = min(_MOST_KEPT, profile.depth + sum(each.longest_gap for each in losing))
+        return (
+            f"newer ones replaced them in the relay's subscription, whose `depth` of {profile.depth} was too small",
+            f"`depth: {depth}` in the `qos` of {graph.name} holds as many as came at once",
+        )
+    if profile is not None and profile.reliability == "best_effort":
+        return (
+            "they were sent by best effort and lost on the way",
+            f"{_CHECK_NETWORK}; if {names} can publish as reliable, `qos: auto` has lost messages sent again",
+        )
+    return (
+        f"they were lost on the way, and {names} no longer had them to send them again",
+        f"{_CHECK_NETWORK}; with a larger `depth`, {names} can send more of them again",
+    )
 
 
 def too_slow(facts: GroupFacts) -> Found:
@@ -122,9 +153,11 @@ def paused(facts: GroupFacts) -> Found:
 
 
 def slowed(_facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
-    """Find an input that comes at a much lower rate than it used to."""
-    figures = an_input.figures
-    if figures.slowed_from_hz is not None:
+    """Find an input that comes at a much lower rate than it used to, unless it was sent at the same and then lost."""
+    figures, sent_hz = an_input.figures, an_input.graph.sent_hz
+    if figures.slowed_from_hz is None:
+        return
+    if not an_input.graph.undelivered or sent_hz is None or sent_hz < RECOVERED * figures.slowed_from_hz:
         yield Fault(
             f"{an_input.name} has slowed from {words.rate(figures.slowed_from_hz)} to {words.rate(figures.pace_hz)}",
             f"check {nodes(an_input)}: its settings, its load, and the network to it",

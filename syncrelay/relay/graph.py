@@ -40,6 +40,7 @@ def _endpoints(
             printable(info.type),
             why(info.profile),
             is_named=info.is_named,
+            gid=info.gid,
         )
         for info in infos
     )

@@ -10,6 +10,7 @@ from syncrelay.config import TopicConfig
 from syncrelay.config.profile import Profile, is_known, matched
 from syncrelay.dataflow.backend import RclBackend, RclCallError, Source
 from syncrelay.dataflow.bugs import OnceLog
+from syncrelay.dataflow.deliveries import Deliveries
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import TypeImportError
@@ -227,6 +228,11 @@ class TopicInput:
         if source is not None:
             waited, source.waited = source.waited, 0
         return waited
+
+    def deliveries(self) -> Sequence[Deliveries]:
+        """Give what came of each publisher. On the loop's thread."""
+        source = self.outputs.source
+        return source.deliveries() if source is not None else ()
 
     def lost(self) -> int:
         """How many messages DDS lost on the way here since the subscription was made."""

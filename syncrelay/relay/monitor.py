@@ -8,8 +8,9 @@ from math import ceil
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from syncrelay.dataflow.bugs import Bugs
+from syncrelay.dataflow.deliveries import Deliveries
 from syncrelay.dataflow.group import Batch, GroupRelay
-from syncrelay.dataflow.observers import Discovery, Losses, SimulatedClock, Standstills, SystemClock, Waits
+from syncrelay.dataflow.observers import Discovery, Losses, Senders, SimulatedClock, Standstills, SystemClock, Waits
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.explain import (
     Arrivals,
@@ -47,6 +48,14 @@ class _Watched(NamedTuple):
     log: FindingLog
 
 
+class _Gathered(NamedTuple):
+    """How long messages of each topic waited and what came of its publishers; what came and left of each group."""
+
+    waits: Sequence[int]
+    deliveries: Sequence[Sequence[Deliveries]]
+    batches: Sequence[Batch]
+
+
 class Monitor:
     """Makes a report of each group that it evaluates, and logs what is worth a line. On the main thread."""
 
@@ -69,6 +78,7 @@ class Monitor:
         self._watched: dict[GroupRelay, _Watched] = {}
         self._reports: dict[GroupRelay, GroupReport] = {}
         self._losses: dict[TopicInput, Losses] = {}
+        self._senders: dict[TopicInput, Senders] = {}
         self._surroundings = surroundings
         self._waits: dict[TopicInput, Waits] = {}
         self.standstills = Standstills(runtime=runtime)
@@ -107,6 +117,7 @@ class Monitor:
         self._cause_log.watch(binding.group.config.name for binding in bindings)
         topics = dict.fromkeys(each.topic for binding in bindings for each in binding.inputs)
         self._losses = {each: self._losses.get(each) or Losses() for each in topics}
+        self._senders = {each: self._senders.get(each) or Senders() for each in topics}
         self._waits = {each: self._waits.get(each) or Waits() for each in topics}
         self._reports = {group: report for group, report in self._reports.items() if group in self._watched}
         self._surroundings.watch(each for binding in bindings for each in binding.inputs)
@@ -127,24 +138,26 @@ class Monitor:
         self._evaluate(now)
 
     def _evaluate(self, bindings: Sequence[GroupBinding]) -> None:
-        waits, batches = self._loop.call(lambda: self._gather(bindings)).result()
+        gathered = self._loop.call(lambda: self._gather(bindings)).result()
         # `conclude` skips this: an end takes its time on purpose.
         self.standstills.end()
-        self._judge(bindings, waits, batches)
+        self._judge(bindings, gathered)
         self._log()
 
     def conclude(self) -> None:
         """Evaluate all groups a last time, after the receive loop has ended."""
-        self._judge(self._bindings, *self._gather(self._bindings))
+        self._judge(self._bindings, self._gather(self._bindings))
         self._log(is_last=True)
 
-    def _judge(self, bindings: Sequence[GroupBinding], waits: Sequence[int], batches: Sequence[Batch]) -> None:
+    def _judge(self, bindings: Sequence[GroupBinding], gathered: _Gathered) -> None:
         now = self._runtime.time_ns()
         self._try_budget.refill()
         # Messages are received by the system's clock: a step of it is no wait.
         has_stepped = self._system_clock.has_stepped(now)
-        for recent, waited in zip(self._waits.values(), waits, strict=True):
+        for recent, waited in zip(self._waits.values(), gathered.waits, strict=True):
             recent.observe(0 if has_stepped else waited)
+        for (topic, senders), deliveries in zip(self._senders.items(), gathered.deliveries, strict=True):
+            senders.observe(deliveries, topic.publishers)
         self.standstills.observe()
         if self._clock is not None:
             self._clock.observe(self._node.ros_time_ns(), now=now)
@@ -154,7 +167,7 @@ class Monitor:
         self._empty_graph = self._surroundings.empty_graph()
         if self._discovery.goes_on(self._runtime.monotonic()):
             self._discovery.observe(self._surroundings.nodes_and_topics(), now=self._runtime.monotonic())
-        for binding, batch in zip(bindings, batches, strict=True):
+        for binding, batch in zip(bindings, gathered.batches, strict=True):
             with self._bugs.contained(f"evaluating {binding.group.config.name}"):
                 try:
                     self._evaluate_group(binding, batch, now)
@@ -178,7 +191,9 @@ class Monitor:
             now=now,
         )
         self.heard(binding.group.config.name, batch.arrivals)
-        shown = [self._surroundings.of(each, self._losses[each.topic]) for each in binding.inputs]
+        shown = [
+            self._surroundings.of(each, self._losses[each.topic], self._senders[each.topic]) for each in binding.inputs
+        ]
         facts = watch.facts(
             shown,
             now=now,
@@ -207,6 +222,10 @@ class Monitor:
             }
             _LOG.log(_LEVELS[line.severity], "%s", line.text, extra=about)
 
-    def _gather(self, bindings: Sequence[GroupBinding]) -> tuple[list[int], list[Batch]]:
-        """Take how long messages of each topic waited, and what came and left. On the loop's thread."""
-        return [each.take_wait() for each in self._waits], [binding.group.watched() for binding in bindings]
+    def _gather(self, bindings: Sequence[GroupBinding]) -> _Gathered:
+        """Take what was seen of topics and groups. On the loop's thread."""
+        return _Gathered(
+            [each.take_wait() for each in self._waits],
+            [each.deliveries() for each in self._senders],
+            [binding.group.watched() for binding in bindings],
+        )

@@ -36,6 +36,8 @@ class EndpointInfo(NamedTuple):
     """Whether the message that names its node has arrived, or none will come."""
     uses_ros: bool = True
     """Whether it belongs to a node; what uses DDS alone has no name."""
+    gid: bytes = b""
+    """What tells it from all others: 16 bytes, as each of its messages has them. Empty where ROS does not say."""
 
 
 class NodeName(NamedTuple):

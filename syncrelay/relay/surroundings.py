@@ -4,7 +4,7 @@ from collections.abc import Hashable, Iterable, Sequence
 from typing import NamedTuple
 
 from syncrelay.config.wording import counted
-from syncrelay.dataflow.observers import Losses
+from syncrelay.dataflow.observers import Losses, Senders
 from syncrelay.explain import Endpoint, GraphSnapshot, InputGraph, Refusal
 from syncrelay.relay import graph
 from syncrelay.relay.inputs import InputBinding
@@ -54,8 +54,8 @@ class Surroundings:
         """Return the nodes and topics that have been found."""
         return graph.other_nodes(self._node), frozenset(graph.topics_in(self._graph))
 
-    def of(self, binding: InputBinding, losses: Losses) -> InputGraph:
-        """Return what there is around an input, of whose messages DDS lost some."""
+    def of(self, binding: InputBinding, losses: Losses, senders: Senders) -> InputGraph:
+        """Return what there is around an input, of whose messages some may not have come."""
         around = self._around.get(binding)
         if around is None:
             around = self._around[binding] = self._poll(binding)
@@ -75,6 +75,8 @@ class Surroundings:
             lost_in_all=losses.total,
             largest=topic.outputs.largest,
             type_from=topic.type_from,
+            senders=senders.recent,
+            profile=topic.profile,
         )
 
     def _poll(self, binding: InputBinding) -> _Around:

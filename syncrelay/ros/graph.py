@@ -7,6 +7,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import NodeNameNonExistentError
 
 from syncrelay.config.names import is_topic_name
+from syncrelay.dataflow.deliveries import GID_BYTES
 from syncrelay.relay.ports import EndpointInfo, NodeName
 from syncrelay.ros.qos import from_rclpy
 
@@ -71,4 +72,5 @@ def _info(raw: Any) -> EndpointInfo:
         from_rclpy(raw.qos_profile),
         is_named=raw.node_name != _NAMELESS,
         uses_ros=raw.node_name != _WITHOUT_ROS,
+        gid=bytes(raw.endpoint_gid[:GID_BYTES]),
     )

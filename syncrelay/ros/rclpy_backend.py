@@ -8,6 +8,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from syncrelay.cdr import patch_stamp
 from syncrelay.dataflow.backend import ALL, BackendName, Deliver, Inbox, PublishError, Ready
+from syncrelay.dataflow.deliveries import Tally
 from syncrelay.dataflow.flow import Flow
 from syncrelay.dataflow.inbox import PolledInbox
 from syncrelay.ros.entities import has_subscriber
@@ -28,10 +29,12 @@ class RclpyPayload:
 
 
 class RclpySource:
-    """A subscription drained through rclpy."""
+    """A subscription drained through rclpy, which does not say whose a message is: see Tally."""
 
     def __init__(self, subscription: Any, deliver: Deliver) -> None:
         self.deliver = deliver
+        self._tally = Tally()
+        self.deliveries = self._tally.read
         self.waited = self.pending = 0
         self.handle = subscription.handle
         self._type = subscription.msg_type
@@ -43,7 +46,9 @@ class RclpySource:
             self.pending = 0
             return None
         content, info = taken
-        return RclpyPayload(content, info["received_timestamp"])
+        received = info["received_timestamp"]
+        self._tally.note(None, info["publication_sequence_number"], info["source_timestamp"], received)
+        return RclpyPayload(content, received)
 
 
 class RclpyOutlet:

@@ -143,6 +143,24 @@ class Endpoint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Sender:
+    """A node that published an input in the last 10 s, and how many of its messages came, by the numbers they have."""
+
+    node: Text
+    """The node."""
+    sent: int
+    """Messages that it published, from the first that came on."""
+    delivered: int
+    """Those of them that came."""
+    lost: int
+    """Those that did not."""
+    sent_hz: Rate | None
+    """The rate at which it published the last ones, by its own clock."""
+    way_ms: Number | None
+    """The least time from publication to receipt: by two clocks if it runs on another machine."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Input:
     """An input of a group and its output. Counts are since the start; what ends in `_lately` is of the last 10 s."""
 
@@ -185,11 +203,13 @@ class Input:
     other_drops_lately: Mapping[Text, int] | None = None
     """As `other_drops`."""
     lost: int
-    """Messages that DDS lost on their way to the relay, lately."""
+    """Messages that were published and did not come, lately: by their numbers, or else as DDS reports it."""
     missing: Number
     """The share of the last sets that left without it, 0 to 1."""
     publishers: tuple[Endpoint, ...]
     """Who publishes the topic."""
+    senders: tuple[Sender, ...] = ()
+    """What came of each node's messages, lately; empty where messages do not say whose they are."""
     subscribers: tuple[Endpoint, ...]
     """Who subscribes to the output."""
 

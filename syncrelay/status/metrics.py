@@ -65,17 +65,28 @@ def _of_inputs(state: RelayState) -> Iterator[Metric]:
         " before it was found is not counted.",
         labels=("group", "topic"),
     )
+    by_sender = ("group", "topic", "publisher")
+    sent = CounterMetricFamily(
+        "syncrelay_messages_sent",
+        "Messages that a node published, by the numbers that they have, from the first that came on. Those beyond"
+        " syncrelay_messages_delivered were lost. No sample where messages do not say whose they are.",
+        labels=by_sender,
+    )
+    delivered = CounterMetricFamily("syncrelay_messages_delivered", "Those of them that came.", labels=by_sender)
     buffered = GaugeMetricFamily("syncrelay_queue_length", "Messages waiting in queues.", labels=("group", "topic"))
     for report in state.groups:
         for each in report.facts.inputs:
             labels = [report.facts.name, each.name]
             received.add_metric(labels, each.counts.fed)
             lost.add_metric(labels, each.graph.lost_in_all)
+            for sender in each.graph.senders:
+                sent.add_metric([*labels, sender.node], sender.sent_in_all)
+                delivered.add_metric([*labels, sender.node], sender.delivered_in_all)
             buffered.add_metric(labels, each.counts.buffered)
             outcomes.add_metric([*labels, "matched"], each.counts.matched)
             for reason, count in each.counts.dropped.items():
                 outcomes.add_metric([*labels, reason.value], count)
-    yield from (received, lost, outcomes, buffered)
+    yield from (received, lost, sent, delivered, outcomes, buffered)
 
 
 def _of_groups(state: RelayState) -> Iterator[Metric]:

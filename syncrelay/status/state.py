@@ -16,6 +16,7 @@ from syncrelay.explain import (
     GroupReport,
     InputFacts,
     Mismatch,
+    Sender,
     explanation,
 )
 from syncrelay.status import document
@@ -161,9 +162,10 @@ def _input(facts: GroupFacts, index: int, fates: DropFates, lately: DropFates) -
         dropped_lately=_by_reason(figures.dropped),
         unneeded_lately=lately.unneeded,
         other_drops_lately=_by_reason(lately.others),
-        lost=each.graph.lost,
+        lost=each.graph.undelivered,
         missing=round(facts.figures.missing[index], 3),
         publishers=tuple(map(_endpoint, each.graph.publishers)),
+        senders=tuple(_sender(sender) for sender in each.graph.senders if sender.sent),
         subscribers=tuple(map(_endpoint, each.graph.subscribers)),
     )
 
@@ -174,6 +176,17 @@ def _by_reason(drops: Mapping[DropReason, int]) -> dict[str, int]:
 
 def _endpoint(endpoint: Endpoint) -> document.Endpoint:
     return document.Endpoint(node=endpoint.node, type=endpoint.type, mismatch=_mismatch(endpoint.mismatch))
+
+
+def _sender(sender: Sender) -> document.Sender:
+    return document.Sender(
+        node=sender.node,
+        sent=sender.sent,
+        delivered=sender.delivered,
+        lost=sender.lost,
+        sent_hz=sender.sent_hz and round(sender.sent_hz, 3),
+        way_ms=_ms(sender.way),
+    )
 
 
 def _mismatch(why: Mismatch | None) -> document.Mismatch | None:

@@ -169,6 +169,8 @@ def connections(group: Group, width: int) -> Iterator[Text]:
         receivers = _nodes(each.subscribers) or "nobody"
         yield from wrapped(f"{each.output}, to {receivers}", width, first=line("  as   "))
         yield from wrapped(phrases.fates(each), width, first=line("  "))
+        if sent := phrases.sent(each):
+            yield from wrapped(sent, width, first=line("  "))
 
 
 def _nodes(endpoints: Sequence[Endpoint]) -> str:

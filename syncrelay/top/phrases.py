@@ -105,13 +105,23 @@ def drops_lately(an_input: Input) -> str:
     return f"{f'{drops(others)}, ' if others else ''}{an_input.unneeded_lately} not needed"
 
 
+def sent(an_input: Input) -> str | None:
+    """Say how many messages of an input were published lately and how many were lost; None where that is not known."""
+    if not an_input.senders:
+        return f"{an_input.lost} lost on the way in the last 10 s" if an_input.lost else None
+    parts = [
+        f"{each.sent} from {each.node}{f' at {rate(each.sent_hz)}' if each.sent_hz else ''}, {each.lost or 'none'} lost"
+        for each in an_input.senders
+    ]
+    return f"in the last 10 s: {'; '.join(parts)}"
+
+
 def fates(an_input: Input) -> str:
     """Say what became of all messages of an input."""
-    lost = f"; {an_input.lost} lost on the way" if an_input.lost else ""
     others = an_input.dropped if an_input.other_drops is None else an_input.other_drops
     unneeded = f" {an_input.unneeded} not needed," if an_input.unneeded else ""
     reasons = f" ({drops(others)})" if others else ""
     return (
         f"{an_input.received} received, {an_input.matched} in sets, {an_input.buffered} waiting,{unneeded}"
-        f" {sum(others.values())} dropped{reasons}{lost}"
+        f" {sum(others.values())} dropped{reasons}"
     )

@@ -22,7 +22,7 @@ class _Reader:
 
     def take(self) -> bytes | None:
         taken = self._reader.take()
-        return None if taken is None else taken[0]
+        return None if taken is None else taken[0].content
 
 
 class SimulatedWorld:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from syncrelay.config import load_text
 from syncrelay.dataflow.backend import ALL
+from syncrelay.dataflow.deliveries import Deliveries
 from syncrelay.dataflow.flow import Flow
 from syncrelay.dataflow.group import GroupRelay
 from tests.ros.cdr_messages import VECTOR
@@ -38,6 +39,9 @@ class Source:
         self.deliver: Any = deliver
         self.waited = 0
         self.pending = ALL
+
+    def deliveries(self) -> Sequence[Deliveries]:
+        return ()
 
     def take(self) -> Named | None:
         message = self.messages.popleft() if self.messages else None

@@ -34,6 +34,7 @@ from syncrelay.explain.unneeded import DropFates
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
 from tests.explain.support.cases import AGES, LIDAR, STEADY, camera, dropped, overflowing, without_camera
+from tests.explain.support.cases_flow import undelivered
 from tests.explain.support.cases_stamps import AT_TICKS
 from tests.explain.support.groups import BEGAN, IMAGE, MS, NOW, S, a_group, a_silent_group, an_input
 
@@ -255,6 +256,10 @@ def rates(count: int, fed: int) -> tuple[float, float]:
     return figures.rate_hz, figures.usual_hz
 
 
+def lossy(**facts: Any) -> Any:
+    return undelivered(12, 4, figures={"pace_hz": 2.0, "slowed_from_hz": 10.0}, **facts)
+
+
 def is_steady(*periods: int) -> bool:
     at = BEGAN
     return steady_period([at, *(at := at + each for each in periods)]) is not None
@@ -285,6 +290,8 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "stood still": (0, S, 500 * MS, lambda by: told(stood_still(by), Code.TOO_SLOW)),
     "a pause that a rate explains": (0, 9 * S, 3 * S + 1, lambda by: told(stood_still(2 * S, pause=by), Code.TOO_SLOW)),
     "who would show a burst": (50, 0, 24, lambda hz: told(held_up(hz / 10), Code.BURSTS, "all inputs")),
+    "sent as before": (0, 20, 9, lambda hz: not told(a_group(lossy(sent_hz=float(hz))), Code.SLOWED)),
+    "given up by a history": (12, 0, 5, lambda n: told(a_group(lossy(lost=n)), Code.MESSAGES_LOST, "replaced them")),
     "losses are the cause": (1, 99, 50, lambda n: Code.FEW_SETS not in codes(few(Share(0, 100, 10 * S), lost=n))),
     # Stamps: of another clock, unset, repeated, falling, drifting.
     "another clock": (0, 5 * S, S + 5 * MS + 1, lambda by: told(late(by), Code.OTHER_CLOCK)),

@@ -3,6 +3,7 @@
 import random
 import threading
 from collections.abc import Iterator
+from itertools import count, pairwise
 from types import SimpleNamespace
 
 import pytest
@@ -17,6 +18,7 @@ from tests.ros.streams import BEGIN, MS
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from geometry_msgs.msg import Vector3Stamped
 from rclpy.qos import QoSProfile
 
 from syncrelay.ros import backend_choice
@@ -63,6 +65,33 @@ def test_a_payload_that_serves_two_sets_keeps_its_own_stamp(here, little_endian)
     with pytest.raises(ValueError, match="does not fit"):
         outlet.send_stamped(payload, LATEST_STAMP + 1)
     assert bytes(payload.content()) == original
+
+
+def test_messages_that_a_short_history_gave_up_are_counted_by_their_publisher(here):
+    topic, chance = vectors_on(here.node, "/short", QoSProfile(depth=3)), random.Random(3)
+    publishers = [topic.publisher]
+    # rclpy does not say whose a message is.
+    if here.backend.name is BackendName.COMPILED:
+        publishers.append(here.node.create_publisher(Vector3Stamped, "/short", 10))
+    source = here.backend.source(topic.subscription, print)
+    numbers = [count(1) for _ in publishers]
+    came: list[list[int]] = [[] for _ in publishers]
+    for _ in range(300):
+        whose = chance.randrange(len(publishers))
+        for _ in range(chance.choice([1, 1, 2, 3, 5, 8])):
+            publishers[whose].publish(vector(BEGIN, frame_id=f"{whose} {next(numbers[whose])}"))
+        while (payload := take(source)) is not None:
+            of, number = map(int, bytes(payload.content())[16:].split(b"\0")[0].split())
+            came[of].append(number)
+    told = source.deliveries()
+    assert {(each.first, each.newest, each.delivered, each.longest_gap) for each in told} == {
+        (got[0], got[-1], len(got), max(after - before - 1 for before, after in pairwise(got))) for got in came
+    }
+    if len(publishers) > 1:
+        infos = here.node.get_publishers_info_by_topic("/short")
+        assert {each.gid for each in told} == {bytes(each.endpoint_gid) for each in infos}
+    assert all(each.published > BEGIN and 0 <= each.least_way < _SECOND for each in told)
+    assert [(each.longest_gap, each.least_way) for each in source.deliveries()] == [(0, None)] * len(told)
 
 
 def test_what_is_serialized_here_is_published_and_counted(here):

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import count
 from typing import Any, Final, NamedTuple
 
 from syncrelay.config.profile import Profile, mismatch
@@ -68,6 +69,8 @@ class Sample(NamedTuple):
     content: bytes
     sent: int
     """By the writer's system clock."""
+    gid: bytes
+    """Its writer's."""
 
 
 class Endpoint:
@@ -85,6 +88,7 @@ class Endpoint:
         left = {key: value for key, value in defaults.items() if getattr(profile, key) == "system_default"}
         self.profile = replace(profile, **left)
         self.is_ended = False
+        self.gid = next(node.participant.bus.gids).to_bytes(16)
         self.links: dict[Endpoint, Link] = {}
         """By the other end: what is connected, or about to be."""
 
@@ -123,7 +127,7 @@ class Writer(Endpoint):
     def write(self, content: bytes, *, dies: bool = False) -> None:
         """Write a message; with `dies`, its process is killed in the midst of that."""
         bus = self.bus
-        sample = Sample(self.written, content, self.participant.process.time_ns())
+        sample = Sample(self.written, content, self.participant.process.time_ns(), self.gid)
         self.written += 1
         self.history.append(sample)
         if bus.written is not None:
@@ -163,13 +167,13 @@ class Reader(Endpoint):
         """How many writers it has found that serve it."""
         return sum(link.is_receiving for link in self.links.values())
 
-    def take(self) -> tuple[bytes, int] | None:
+    def take(self) -> tuple[Sample, int] | None:
         """Take the oldest message, and when it was received."""
         lifespan = self.profile.lifespan
         while self.queue:
             sample, received = self.queue.popleft()
             if not lifespan or self.participant.process.time_ns() - sample.sent <= lifespan:
-                return sample.content, received
+                return sample, received
         return None
 
 
@@ -429,6 +433,7 @@ class Bus:
         self.weather = weather or Weather()
         self.random = scheduler.stream("bus").random
         self.participants: list[Participant] = []
+        self.gids = count(1)
         self._met: dict[tuple[Participant, Participant], int] = {}
         """When the first of two finds the second."""
         self.written: Callable[[Writer, Sample], object] | None = None

@@ -12,6 +12,7 @@ from rclpy.serialization import serialize_message
 from syncrelay.cdr import patch_stamp, read_stamp
 from syncrelay.config.profile import Profile
 from syncrelay.dataflow.backend import ALL, BackendName, Deliver, PublishError, Ready
+from syncrelay.dataflow.deliveries import Tally
 from syncrelay.dataflow.flow import Flow
 from syncrelay.dataflow.inbox import PolledInbox
 from syncrelay.relay.ports import Answer, Call, EndpointInfo, NodeName, Outcome, RclError
@@ -80,8 +81,8 @@ class SimulatedGraph:
         # Observed: the graph does not tell histories.
         profile = replace(each.profile, history="unknown", depth=0)
         if each.node in self._participant.named:
-            return EndpointInfo(each.node.name, each.node.namespace, each.type, profile)
-        return EndpointInfo(_NAMELESS, _NAMELESS, each.type, profile, is_named=False)
+            return EndpointInfo(each.node.name, each.node.namespace, each.type, profile, gid=each.gid)
+        return EndpointInfo(_NAMELESS, _NAMELESS, each.type, profile, is_named=False, gid=each.gid)
 
 
 class SimulatedSubscription:
@@ -265,10 +266,10 @@ class SimulatedNode:
 
     def _take_clock(self) -> None:
         taken = self._clock.take()
-        if taken is None or len(taken[0]) < 12:
+        if taken is None or len(taken[0].content) < 12:
             return
         # A Time stands where a Header's stamp does.
-        now = read_stamp(taken[0])
+        now = read_stamp(taken[0].content)
         if now is None:
             return
         if now < 0:
@@ -332,13 +333,18 @@ class SimulatedSource:
         self.deliver = deliver
         self.waited = self.pending = 0
         self._take = subscription.reader.take
+        self._tally = Tally()
+        self.deliveries = self._tally.read
 
     def take(self) -> SimulatedPayload | None:
         taken = self._take()
         if taken is None:
             self.pending = 0
             return None
-        return SimulatedPayload(*taken)
+        sample, received = taken
+        # DDS numbers from 1.
+        self._tally.note(sample.gid, sample.number + 1, sample.sent, received)
+        return SimulatedPayload(sample.content, received)
 
 
 class SimulatedOutlet:

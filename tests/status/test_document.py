@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from syncrelay import own_version
-from syncrelay.explain import Endpoint, Mismatch, explanation
+from syncrelay.explain import Endpoint, Mismatch, Sender, explanation
 from syncrelay.status import Level, Phase, group_of, level, read_status, status_of
 from syncrelay.status.document import NotAStatusError
 from tests.status.support.states import BEGAN, relay, started, working
@@ -114,7 +114,20 @@ def test_what_is_said_of_an_input():
         "missing": 0.0,
         "publishers": [{"node": "/usb_cam", "type": "sensor_msgs/msg/Image", "mismatch": None}],
         "subscribers": [{"node": "/fusion", "type": "sensor_msgs/msg/Image", "mismatch": None}],
+        "senders": [],
     }
+
+
+def test_of_each_node_it_is_said_what_came_of_its_messages_lately():
+    report = working()
+    camera, lidar = report.facts.inputs
+    senders = Sender("/usb_cam", 200, 188, sent_hz=20.0004, way=350_000, sent_in_all=900), Sender("/gone", 0, 0)
+    camera = replace(camera, graph=replace(camera.graph, lost=5, senders=senders))
+    said = group_of(replace(report, facts=replace(report.facts, inputs=(camera, lidar)))).as_dict()["inputs"][0]
+    assert said["senders"] == [
+        {"node": "/usb_cam", "sent": 200, "delivered": 188, "lost": 12, "sent_hz": 20.0, "way_ms": 0.35}
+    ]
+    assert said["lost"] == 12
 
 
 def test_what_did_not_happen_yet_is_null_or_empty():

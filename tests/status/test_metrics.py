@@ -8,7 +8,7 @@ import pytest
 from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
-from syncrelay.explain import Code, Finding, Severity
+from syncrelay.explain import Code, Finding, Sender, Severity
 from syncrelay.status import Phase
 from syncrelay.status.metrics import registry
 from tests.status.support.states import BEGAN, S, relay, started, working
@@ -54,6 +54,18 @@ def test_what_dds_lost_is_counted_beside_what_was_received():
     assert value(found, "syncrelay_messages_lost_total", group="front", topic="/camera") == 7
     assert value(found, "syncrelay_messages_lost_total", group="front", topic="/lidar") == 0
     assert value(found, "syncrelay_messages_received_total", group="front", topic="/camera") == 34
+
+
+def test_what_each_node_sent_and_what_came_of_it_is_counted():
+    report = working()
+    camera, lidar = report.facts.inputs
+    senders = Sender("/usb_cam", 9, 8, sent_in_all=700, delivered_in_all=650), Sender("/gone", 0, 0, sent_in_all=3)
+    camera = replace(camera, graph=replace(camera.graph, senders=senders))
+    found = samples(relay(replace(report, facts=replace(report.facts, inputs=(camera, lidar)))))
+    of_camera = {"group": "front", "topic": "/camera"}
+    for node, sent, delivered in (("/usb_cam", 700, 650), ("/gone", 3, 0)):
+        assert value(found, "syncrelay_messages_sent_total", **of_camera, publisher=node) == sent
+        assert value(found, "syncrelay_messages_delivered_total", **of_camera, publisher=node) == delivered
 
 
 def test_the_time_of_the_last_set_is_told_once_there_was_one():

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from syncrelay.config import GroupConfig, load_text
-from syncrelay.explain import Endpoint, GroupReport, GroupWatch, InputGraph, RecentDrop, judge
+from syncrelay.explain import Endpoint, GroupReport, GroupWatch, InputGraph, RecentDrop, Sender, judge
 from syncrelay.status import Phase, RelayState
 from syncrelay.sync import Match, Message
 
@@ -97,6 +97,11 @@ def _messages(sensor: Sensor, seconds: int, rng: random.Random) -> Iterator[tupl
         yield taken + round(lag), taken - round(sensor.behind_ms * MS)
 
 
+def _sender(sensor: Sensor, node: str) -> Sender:
+    sent = round(10 * sensor.rate_hz)
+    return Sender(node, sent, sent, sent_hz=sensor.rate_hz, way=MS, sent_in_all=sent, delivered_in_all=sent)
+
+
 def _graph(config: GroupConfig, index: int, sensor: Sensor | None) -> InputGraph:
     topic = config.topics[index]
     nodes = sensor.publishers if sensor else ()
@@ -105,4 +110,5 @@ def _graph(config: GroupConfig, index: int, sensor: Sensor | None) -> InputGraph
         output=topic.output,
         publishers=tuple(Endpoint(name, topic.type or "") for name in nodes if sensor is not None),
         subscribers=(Endpoint("/fusion", topic.type or ""),),
+        senders=tuple(_sender(sensor, name) for name in nodes if sensor is not None and sensor.rate_hz),
     )

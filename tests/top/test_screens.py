@@ -152,6 +152,7 @@ def test_a_group_is_opened_with_figures_findings_inputs_the_strip_and_who_publis
     assert "  from /camera_driver" in lines
     assert "  as   /front/camera/image_raw, to /fusion" in lines
     assert "  900 received, 300 in sets, 2 waiting, 598 not needed, 0 dropped" in lines
+    assert "  in the last 10 s: 300 from /camera_driver at 30 Hz, none lost" in lines
 
 
 def test_a_type_that_is_not_known_yet_is_said_to_be_none():

@@ -152,6 +152,11 @@ def _send_there_and_back(backend: CompiledBackend, subscription: Any, publisher:
     _require([content for content, _ in came] == [_PAYLOAD, _PAYLOAD], "a message does not come back as it was")
     times_are_right = all(0 <= received - before <= _PATIENCE_NS for _, received in came)
     _require(times_are_right, "the time of receipt is not as expected")
+    numbers_are_right = all(
+        each.sent == each.delivered == len(came) and 0 <= each.published - before <= _PATIENCE_NS
+        for each in source.deliveries()
+    )
+    _require(numbers_are_right, "the number of a message or the time of its publication is not as expected")
 
 
 def _require(holds: bool, what: str) -> None:  # noqa: FBT001  an assertion

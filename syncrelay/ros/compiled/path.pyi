@@ -1,7 +1,8 @@
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from syncrelay.dataflow.backend import Deliver as AnyDeliver
+from syncrelay.dataflow.deliveries import Deliveries
 from syncrelay.dataflow.flow import Flow as _Flow
 
 SOURCE: str
@@ -30,6 +31,7 @@ class Source:
     pool: Pool
     def __init__(self, librcl: Librcl, subscription: Any, deliver: AnyDeliver) -> None: ...
     def take(self) -> Payload | None: ...
+    def deliveries(self) -> Sequence[Deliveries]: ...
     def require_margin(self) -> None: ...
 
 class Inbox:

@@ -13,13 +13,14 @@ import time
 from collections import deque
 
 from syncrelay.dataflow.backend import PublishError, RclCallError
+from syncrelay.dataflow.deliveries import GID_BYTES, LARGEST_GAP, MOST_PUBLISHERS, Deliveries
 from syncrelay.dataflow.flow import RECENT, Watched
 from syncrelay.explain import RecentDrop
 from syncrelay.sync import DropReason, Match, Message
 
 cimport cython
 from cpython.memoryview cimport PyMemoryView_FromMemory
-from libc.stdint cimport int32_t, int64_t, uint8_t, uint32_t, uint64_t, uintptr_t
+from libc.stdint cimport INT64_MAX, int32_t, int64_t, uint8_t, uint32_t, uint64_t, uintptr_t
 from libc.stdlib cimport calloc, free
 from libc.string cimport memcmp, memcpy, memset
 
@@ -183,8 +184,15 @@ cdef enum:
     NOTHING_TAKEN = 401
     SPARE = 8
     BATCH = 256
+    MOST_COUNTED = 16
+    GID = 16
+
+assert (MOST_COUNTED, GID) == (MOST_PUBLISHERS, GID_BYTES)
 
 cdef int64_t SECOND = 1_000_000_000
+# rmw's number of a message where the middleware has none.
+cdef uint64_t NOT_NUMBERED = <uint64_t>-1
+cdef uint64_t MOST_SKIPPED = LARGEST_GAP
 # More than any history holds.
 cdef uint64_t ALL = <uint64_t>1 << 62
 
@@ -325,6 +333,18 @@ cdef class Payload:
             self.pool.give_back(self.message)
 
 
+# As dataflow.deliveries.Deliveries. `least_way` is INT64_MAX until a message came since it was last read.
+ctypedef struct Count:
+    uint8_t gid[GID]
+    uint64_t first
+    uint64_t newest
+    uint64_t delivered
+    uint64_t longest_gap
+    uint64_t seen
+    int64_t published
+    int64_t least_way
+
+
 @cython.final
 @cython.no_gc_clear
 cdef class Source:
@@ -337,6 +357,10 @@ cdef class Source:
     cdef const void * subscription
     cdef object owner
     cdef RoomyInfo info
+    cdef Count counts[MOST_COUNTED]
+    cdef Count * counted
+    cdef int n_counts
+    cdef uint64_t seen
     cdef sr_signal * signal
     cdef SerializedMessage * next
     cdef Payload held
@@ -368,6 +392,8 @@ cdef class Source:
         cdef int code
         with nogil:
             code = self.librcl.take(self.subscription, message, &self.info.info, NULL)
+            if not code:
+                self._note()
         if code:
             if code != NOTHING_TAKEN:
                 self.librcl.require(code, "rcl_take_serialized_message")
@@ -379,6 +405,68 @@ cdef class Source:
         cdef Payload payload = Payload.__new__(Payload)
         payload.pool, payload.message, payload.received = self.pool, message, self.info.info.received_timestamp
         return payload
+
+    cdef void _note(self) noexcept nogil:
+        """Count the message that was taken: as dataflow.deliveries.Tally.note."""
+        cdef const MessageInfo * info = &self.info.info
+        cdef uint64_t number = info.publication_sequence_number
+        if number == NOT_NUMBERED:
+            return
+        cdef Count * count = self.counted
+        if count == NULL or memcmp(count.gid, info.publisher_gid.data, GID):
+            count = self.counted = self._count_of(info)
+        self.seen += 1
+        count.seen = self.seen
+        if number > count.newest and number - count.newest - 1 <= MOST_SKIPPED:
+            if number - count.newest - 1 > count.longest_gap:
+                count.longest_gap = number - count.newest - 1
+        elif count.delivered:
+            count.first, count.delivered = number, 0
+        count.newest = number
+        count.published = info.source_timestamp
+        count.delivered += 1
+        if info.received_timestamp - info.source_timestamp < count.least_way:
+            count.least_way = info.received_timestamp - info.source_timestamp
+
+    cdef Count * _count_of(self, const MessageInfo * info) noexcept nogil:
+        """The count of a publisher: a new one, in the place of the longest silent, where it has none."""
+        cdef Count * count = NULL
+        cdef int n
+        for n in range(self.n_counts):
+            if not memcmp(self.counts[n].gid, info.publisher_gid.data, GID):
+                return &self.counts[n]
+            if count == NULL or self.counts[n].seen < count.seen:
+                count = &self.counts[n]
+        if self.n_counts < MOST_COUNTED:
+            count = &self.counts[self.n_counts]
+            self.n_counts += 1
+        memcpy(count.gid, info.publisher_gid.data, GID)
+        count.first = count.newest = info.publication_sequence_number
+        count.delivered = count.longest_gap = 0
+        count.least_way = INT64_MAX
+        return count
+
+    def deliveries(self):
+        """Give what came of each publisher."""
+        cdef Count * count
+        cdef int n
+        told = []
+        for n in range(self.n_counts):
+            count = &self.counts[n]
+            least_way = None if count.least_way == INT64_MAX else count.least_way
+            told.append(
+                Deliveries(
+                    (<char *>count.gid)[:GID],
+                    count.first,
+                    count.newest,
+                    count.delivered,
+                    count.published,
+                    count.longest_gap,
+                    least_way,
+                )
+            )
+            count.longest_gap, count.least_way = 0, INT64_MAX
+        return told
 
     def require_margin(self):
         """Raise RclCallError where librcl wrote more of a message's information than MessageInfo has."""

@@ -1,12 +1,19 @@
 """What the flow tells: facts that come to a finding, and the nearest that do not."""
 
-from syncrelay.explain import Code, Distribution, Pause, Share, Standing, Standstill
+from syncrelay.config.profile import Profile
+from syncrelay.explain import Code, Distribution, Pause, Sender, Share, Standing, Standstill
 from syncrelay.sync.messages import DropReason
 from tests.explain.support.cases import AGES, LIDAR, camera, dropped, fed, overflowing, without_camera
 from tests.explain.support.groups import MS, NOW, S, a_group, a_silent_group, an_input
 
 HELD_UP = {"bursts": 1, "held": 2 * S, "held_up": [(NOW - 4 * S, NOW - 2 * S)]}
 FEW = {"standing": Standing.FEW}
+
+
+def undelivered(count, gap, *, lost=0, others=(), figures=None, sent_hz=20.0, **profile):
+    """An input of which so many of 200 messages did not arrive, at most `gap` in a row; DDS says that it lost some."""
+    sender = Sender("/usb_cam", 200, 200 - count, longest_gap=gap, sent_hz=sent_hz)
+    return camera(senders=(sender, *others), lost=lost, profile=Profile(**profile), figures=figures)
 
 
 def held_up(begin, end):
@@ -53,6 +60,15 @@ FOUND = {
         standstills=(Standstill(NOW - S, 3 * S),),
     ),
     "a message that DDS lost": a_group(camera(lost=1), LIDAR),
+    "messages that came too many at once": a_group(undelivered(12, 4, depth=1), LIDAR),
+    "messages of two publishers that came too many at once": a_group(
+        undelivered(12, 4, others=[Sender("/other", 90, 85, longest_gap=2), Sender("/third", 90, 90)]), LIDAR
+    ),
+    "messages of best effort that were lost": a_group(undelivered(12, 1, lost=12, reliability="best_effort"), LIDAR),
+    "messages that were lost though they are reliable": a_group(undelivered(12, 9, lost=7), LIDAR),
+    "an input that came slowly because messages were lost": a_group(
+        undelivered(100, 4, depth=1, figures={"pace_hz": 2.0, "slowed_from_hz": 10.0}), LIDAR
+    ),
     "a relay that does not keep up": a_group(waited=700 * MS),
     "messages that came at once when a standstill was over": a_group(
         # The last second of them by the network, which sends again what it could not deliver.
