@@ -35,22 +35,6 @@ def test_no_line_but_the_first_of_an_entry_begins_at_the_margin(text):
     assert [line.strip() for line in more] == [printable(line).strip() for line in text.split("\n")[1:]]
 
 
-@pytest.mark.parametrize(
-    ("text", "shown"),
-    [
-        ("\x1b[31m", "\\x1b[31m"),
-        ("\x9b5A", "\\x9b5A"),
-        ("a\nb", "a\\nb"),
-        ("\u202eexe.txt", "\\u202eexe.txt"),
-        ("\udce4", "\\udce4"),
-        ("\u2028", "\\u2028"),
-        ("/camera/ümlaut 点", "/camera/ümlaut 点"),
-    ],
-)
-def test_what_would_move_hide_or_turn_is_escaped_and_all_else_stays(text, shown):
-    assert printable(text) == shown
-
-
 @pytest.fixture
 def log():
     """The relay's log, which is restored afterwards."""

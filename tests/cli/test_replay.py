@@ -42,22 +42,6 @@ def test_several_files_are_replayed_as_one(folder):
     assert (done.returncode, done.stdout, done.stderr) == (0, _SUMMARY + _SUMMARY.replace("front", "rear"), "")
 
 
-def test_with_json_there_is_a_line_a_set_and_the_summary_is_talk(folder):
-    done = run_here("replay", "rig.mcap", "--config", "f.yaml", "--json", folder=folder)
-    lines = [json.loads(line) for line in done.stdout.splitlines()]
-    assert (len(lines), done.stderr) == (39, _SUMMARY)
-    camera, lidar = (frame.time - 5_000_000 for frame in reversed(rig()[:2]))
-    assert lines[0] == {
-        "group": "front",
-        "time": rig()[2].time,
-        "stamps": {"/camera": camera, "/lidar": lidar},
-        "offsets": {},
-        "span": 3_000_000,
-        "latency": 97_000_000,
-        "missing": [],
-    }
-
-
 def test_with_drops_there_is_a_line_a_drop_with_its_reason(folder):
     (folder / "f.yaml").write_text(_file(slop="1ms"))
     done = run_here("replay", "rig.mcap", "--config", "f.yaml", "--drops", folder=folder)

@@ -83,22 +83,6 @@ def test_what_another_program_writes_is_read_to_its_end(command, folder, environ
     assert done.stdout.endswith(": ok, 1 group, 2 topics\n")
 
 
-def test_files_together_are_checked_as_the_relay_takes_them(folder, environ):
-    rear = GOOD.replace("front", "rear")
-    (folder / "rear.yaml").write_text(rear)
-    (folder / "loop.yaml").write_text(rear.replace("/a", "/front/b"))
-    done = run_here("validate", "--together", "good.yaml", "rear.yaml", folder=folder, environ=environ)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == "good.yaml, rear.yaml: ok together, 2 groups, 2 topics\n"
-    each = run_here("validate", "good.yaml", "loop.yaml", folder=folder, environ=environ)
-    assert each.stdout == "good.yaml: ok, 1 group, 2 topics\nloop.yaml: ok, 1 group, 2 topics\n"
-    together = run_here("validate", "--together", "good.yaml", "loop.yaml", folder=folder, environ=environ)
-    assert (together.returncode, together.stdout) == (1, "")
-    assert together.stderr.startswith("good.yaml:7:17: groups.front.topics[1].topic: the default output `/front/b` is")
-    relayed = run("--config", "good.yaml", "--config", "loop.yaml", folder=folder, environ=environ)
-    assert (relayed.returncode, relayed.stderr) == (1, together.stderr)
-
-
 def test_json_tells_of_files_together_in_which_the_problem_is(folder, environ):
     words = ["validate", "--together", "--format=json", "good.yaml", "f.yaml"]
     good, front = json.loads(run_here(*words, folder=folder, environ=environ).stdout)

@@ -40,23 +40,6 @@ def test_a_group_that_a_bug_stopped_is_rebuilt_though_its_keys_are_the_same(envi
 
 
 @pytest.mark.parametrize(
-    "new",
-    [
-        file(FRONT, REAR),
-        file(REAR, FRONT),
-        "# a comment\n" + file(FRONT, REAR, top="x-note: 1\nnode: {name: syncrelay}\nmetrics: {}\n"),
-        file(FRONT, REAR, top="defaults: {queue_size: 10, slop: 1s}\n"),
-        file(
-            FRONT, REAR, top="export: {lerobot: {group: rear, fps: 10, task: pick, features: {action: '/a:height'}}}\n"
-        ),
-        file(FRONT, REAR.replace("/a,", "/a, qos: auto, offset: 0,")),
-    ],
-)
-def test_what_says_the_same_changes_nothing(new, environ):
-    assert between(file(FRONT, REAR), new, environ).is_empty
-
-
-@pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
         ({}, {"keys": "queue_size: 5"}, [("queue_size", None, "5")]),

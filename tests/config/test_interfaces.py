@@ -1,7 +1,7 @@
 import sys
 
 from syncrelay.config import Severity, load_text
-from syncrelay.config.interfaces import Field, Interfaces, parse_fields
+from syncrelay.config.interfaces import Field, parse_fields
 from tests.config.ament import make_index
 
 FILE = """\
@@ -32,19 +32,6 @@ def test_the_index_of_the_python_environment_counts_without_a_variable(tmp_path,
     assert notes("sensor_msgs/msg/Imu", {}) == ()
     (note,) = notes("no_such/msg/Type", {})
     assert "is not installed here" in note.text
-
-
-def test_an_overlay_adds_to_what_is_below_and_hides_it(tmp_path, environ):
-    index = tmp_path / "share/ament_index/resource_index/rosidl_interfaces"
-    index.mkdir(parents=True)
-    (index / "my_msgs").write_text("msg/Mine.msg")
-    (index / "std_msgs").write_text("msg/Other.msg")
-    overlaid = {"AMENT_PREFIX_PATH": f"{tmp_path}:{environ['AMENT_PREFIX_PATH']}"}
-    interfaces = Interfaces.find(overlaid)
-    assert interfaces is not None
-    assert interfaces.types("my_msgs") == ("my_msgs/msg/Mine",)
-    assert interfaces.types("std_msgs") == ("std_msgs/msg/Other",)
-    assert "sensor_msgs/msg/Image" in interfaces.types("sensor_msgs")
 
 
 def test_a_type_without_its_definition_is_a_note_if_its_stamp_matters(environ):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from syncrelay.config import Config, ConfigError, rereading
+from syncrelay.config import Config, rereading
 from syncrelay.config.rereading import ConfigFiles, Reading
 from tests.cli.command import GOOD
 from tests.faults.extent import chosen
@@ -100,25 +100,6 @@ def test_what_is_read_is_told_once_and_to_who_waits(files: ConfigFiles, path: Pa
     assert told.wait(60)
     assert names(taken(files)) == ["rear"]
     assert files.take() is None
-
-
-def test_what_reading_raises_is_raised_where_the_file_is_wanted(files: ConfigFiles, path: Path, monkeypatch):
-    replace(path, "version: 2\n")
-    files.read_again()
-    with pytest.raises(ConfigError, match="expected 1, the version of the format"):
-        taken(files).result()
-
-    def fail(*_paths: str, **_options: object) -> None:
-        raise ZeroDivisionError("a bug of ours")
-
-    monkeypatch.setattr(rereading, "load", fail)
-    files.read_again()
-    with pytest.raises(ZeroDivisionError, match="a bug of ours"):
-        taken(files).result()
-    monkeypatch.undo()
-    replace(path, OTHER)
-    files.read_again()
-    assert names(taken(files)) == ["rear"]
 
 
 @pytest.mark.usefixtures("soon")

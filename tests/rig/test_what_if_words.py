@@ -2,30 +2,7 @@
 
 import pytest
 
-from syncrelay.rig.what_if import Kind, parse_fault
-
-S = 1_000_000_000
-
-
-@pytest.mark.parametrize(
-    ("text", "meaning"),
-    [
-        ("late: /lidar/points 80ms", (Kind.LATE, "/lidar/points", 80_000_000, 0, None)),
-        ("late:/lidar 0.08 s from 1s", (Kind.LATE, "/lidar", 80_000_000, S, None)),
-        ("drop: /imu 2.5%", (Kind.DROP, "/imu", 25_000, 0, None)),
-        ("drop: /imu 100 % until 2s from 1s", (Kind.DROP, "/imu", 1_000_000, S, 2 * S)),
-        ("offset: /imu -1min", (Kind.OFFSET, "/imu", -60 * S, 0, None)),
-        ("drift: /imu -100ppm", (Kind.DRIFT, "/imu", -100_000, 0, None)),
-        ("drift: /imu 0.25ppm", (Kind.DRIFT, "/imu", 250, 0, None)),
-        ("drop: /imu 0.0001%", (Kind.DROP, "/imu", 1, 0, None)),
-        ("dead: imu", (Kind.DEAD, "imu", 0, 0, None)),
-        ("dead: /imu from 12s", (Kind.DEAD, "/imu", 0, 12 * S, None)),
-    ],
-)
-def test_a_fault_is_read(text, meaning):
-    fault = parse_fault(text)
-    assert (fault.kind, fault.topic, fault.amount, fault.begin, fault.end) == meaning
-    assert fault.written == text
+from syncrelay.rig.what_if import parse_fault
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 
 from tests import preloaded
 from tests.doctor.environments import unshared
-from tests.ros.cdr_messages import IMAGE, VECTOR, vector
+from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
 from tests.ros.processes import ours_of
@@ -113,54 +113,6 @@ def test_topics_that_arrive_are_shown_by_their_names_after_remaps_with_rate_and_
     assert camera["received"] > 0
     assert lidar["lag_ms"] - camera["lag_ms"] > 100
     assert (report["graph"]["nodes"], report["graph"]["n_topics"]) == (["/player"], 2)
-
-
-def test_every_fault_of_a_graph_is_named_with_its_topic(stage: Stage):
-    player = stage.player(
-        {"/left": VECTOR, "/right": VECTOR, "/zero": VECTOR, "/quiet": VECTOR, "/camera/image": VECTOR}
-    )
-    stage.player({"/lossy": VECTOR}, reliability="best_effort")
-    stage.player({"/strange": IMAGE, "/clocks/left": VECTOR}, node="stranger")
-    player.is_up()
-    player.start(
-        merged(now("/left"), now("/right", behind_s=37.2), now("/zero", stamped=False), now("/camera/image")), speed=1
-    )
-    text = config(
-        {
-            "clocks": group("/left", "/right"),
-            "zero": group("/left", "/zero"),
-            "quiet": group("/left", "/quiet"),
-            "misspelt": group("/left", "/camera/imag"),
-            "typed": group("/left", "/strange"),
-            "strict": {
-                "policy": "exact_time",
-                "topics": [*inputs({"/left": VECTOR}), *inputs({"/lossy": VECTOR}, qos={"reliability": "reliable"})],
-            },
-        }
-    )
-    faults = {
-        "other_clock",
-        "unstamped",
-        "silent",
-        "no_publisher",
-        "other_type",
-        "incompatible_qos",
-        "output_taken",
-    }
-    code, problems, *_ = examine(stage, text, seconds=8, until=lambda seen: faults <= set(codes(seen.problems)))
-    assert code == 1
-    said = {each["code"]: each for each in problems}
-    assert set(said) >= faults
-    assert "37.2 s" in said["other_clock"]["what"]
-    assert said["unstamped"]["what"].startswith("zero: ")
-    assert "/quiet" in said["silent"]["what"]
-    assert "doctor" not in said["silent"]["fix"]
-    assert said["no_publisher"]["what"].startswith("misspelt: ")
-    assert "`topic: /camera/image`" in said["no_publisher"]["fix"]
-    assert all(name in said["other_type"]["what"] for name in ("/stranger", "/strange", IMAGE))
-    assert all(name in said["output_taken"]["what"] for name in ("clocks: ", "/stranger", "/clocks/left"))
-    assert "best_effort" in said["incompatible_qos"]["what"]
-    assert said["incompatible_qos"]["impact"] == "no sets from strict"
 
 
 # Root's player ends with the doctor, who is another user: he may look where root may, and write nowhere.

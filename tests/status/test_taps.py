@@ -216,20 +216,6 @@ def test_a_query_that_makes_no_sense_is_a_bad_request(query, text):
     assert text in body
 
 
-def test_a_tap_is_answered_over_http():
-    taps = Taps(Tape(), str, runtime=UNLIMITED)
-    with serving(relay(working()), taps=taps) as address:
-        assert asked(address, "/tap?tap=a")[0] == 200
-        note(taps, 2)
-        code, body = asked(address, "/tap?tap=a&after=0")
-        assert code == 200
-        assert len(json.loads(body)["lines"]) == 2
-        assert asked(address, f"/tap?tap=b&group={GROUP.name}")[0] == 200
-        # A reload may have removed its group and may bring it back.
-        assert asked(address, "/tap?tap=b&group=gone&after=0")[0] == 200
-        assert asked(address, "/tap?tap=a&after=0", host="evil.example")[0] == 403
-
-
 def test_fifty_taps_that_stall_keep_nobody_from_an_answer_and_hold_back_no_set():
     taps = Taps(Tape(), str, runtime=UNLIMITED)
     with serving(relay(working()), taps=taps) as address, ExitStack() as stack:

@@ -2,7 +2,6 @@
 
 import pytest
 
-from syncrelay.errors import BagError
 from syncrelay.recordings.analysis.changes import Change, file_with_changes, patch, with_changes
 
 _FILE = """\
@@ -81,21 +80,6 @@ def test_a_merged_value_is_changed_in_the_group_alone(group: str):
     assert [line for line in changed.splitlines() if line not in _SHARED.splitlines()] == ["    slop: 25ms  # better"]
     begin = changed.index(f"  {group}:")
     assert begin < changed.index("slop: 25ms") == changed.index("slop: 25ms", begin)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        Change("rear", None, "slop", "25ms", ""),
-        Change("third", 1, "offset", "5ms", ""),
-        Change("rear", 1, "offset", "5ms", ""),
-        Change("front", None, "policy", "exact_time", ""),
-        Change("rear", None, "policy", "exact_time", ""),
-    ],
-)
-def test_what_would_change_another_group_or_cannot_be_taken_away_is_refused(change: Change):
-    with pytest.raises(BagError, match="cannot be written for one group alone: write them by hand"):
-        file_with_changes(_SHARED, [change])
 
 
 def test_two_spaces_stand_before_a_comment_beside_one_that_stands_further_left():

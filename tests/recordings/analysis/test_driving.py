@@ -194,22 +194,6 @@ def test_every_view_of_an_analysis_counts_alike_whatever_was_recorded(recording,
             assert by_value[queue_size] == group["suggestion"]["now"]
 
 
-def test_what_waited_in_one_group_leaves_before_later_messages_of_another():
-    rows = [(index, n * 100 * MS, n * 100 * MS, "") for n in range(1, 20) for index in range(2)]
-    pair = inputs(dict.fromkeys(_TOPICS[:2], VECTOR))
-    optional = {"topic": "/c", "type": VECTOR, "required": False}
-    groups = {
-        "quick": {"policy": "exact_time", "topics": pair},
-        "slow": {"policy": "exact_time", "topics": [*pair, optional], "max_wait": "90ms"},
-    }
-    recording, told = Made(rows), []
-    bindings = bind(load_text(config(groups)), recording)
-    replay(recording, bindings, listeners=[lambda binding, _, now: told.append((now // MS, binding.group.name))])
-    assert told == sorted(told)
-    assert told[:3] == [(100, "quick"), (190, "slow"), (200, "quick")]
-    assert len(told) == 38
-
-
 def test_what_waits_at_the_end_leaves_at_its_own_time_however_late_the_recording_ends():
     rows = [(0, 100 * MS, 100 * MS, ""), (1, 100 * MS, 100 * MS, "")]
     topics = [*inputs(dict.fromkeys(_TOPICS[:2], VECTOR)), {"topic": "/c", "type": VECTOR, "required": False}]

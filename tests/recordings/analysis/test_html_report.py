@@ -105,17 +105,6 @@ def test_unset_stamps_stand_where_they_were_received(tmp_path):
     assert "drawn at the time of receipt" in as_html("rig", analysis)
 
 
-def test_the_passes_of_a_recording_that_began_again_stand_side_by_side(tmp_path):
-    first = drive(seconds=10)
-    again = [frame._replace(time=frame.time + 11 * _SECOND) for frame in first]
-    analysis = analyzed(tmp_path, [*first, *again])
-    lanes = _lanes(analysis)
-    first_pass = int(np.count_nonzero(lanes.begins < 10.5 * _SECOND))
-    assert first_pass == pytest.approx(len(lanes.begins) / 2, abs=5)
-    assert lanes.begins[-1] > 20 * _SECOND
-    assert _counts(lanes)[0][MATCHED] == analysis.groups[0].evaluation.counts[0].matched
-
-
 def test_what_is_too_much_is_thinned_by_whole_stretches(tmp_path):
     frames = drive(seconds=120, slow_down=5)
     analysis = analyzed(tmp_path, frames)

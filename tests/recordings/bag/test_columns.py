@@ -1,8 +1,5 @@
 """Stamps that are read in one go are those that are read one by one."""
 
-from functools import partial
-
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,7 +7,7 @@ from hypothesis import strategies as st
 from syncrelay.cdr import read_stamp
 from syncrelay.explain import UNREADABLE
 from syncrelay.recordings.bag import Channel, Encoding
-from syncrelay.recordings.bag.columns import Batch, Columns, cdr_stamps, ros1_stamps
+from syncrelay.recordings.bag.columns import Batch, cdr_stamps, ros1_stamps
 from syncrelay.recordings.bag.payloads import read_ros1_stamp
 from syncrelay.recordings.bag.recording import filled
 
@@ -34,35 +31,6 @@ def test_stamps_of_all_payloads_are_those_of_each(all_at_once, one, payloads):
     heads = Batch([(channel, 0, payload) for payload in payloads]).heads
     expected = [one(payload) for payload in payloads]
     assert all_at_once(heads).tolist() == [UNREADABLE if stamp is None else stamp for stamp in expected]
-
-
-def _numbers(keys, batch, places):
-    numbers = [batch.rows[place][1] for place in places.tolist()]
-    return np.array(numbers, dtype=np.int64), numbers if keys else None
-
-
-@given(data=st.data())
-def test_messages_come_in_their_order_to_every_input_that_has_their_channel(data):
-    channels = [Channel(number, "/a", "a/msg/A", Encoding.CDR) for number in range(4)]
-    inputs = data.draw(st.lists(st.lists(st.sampled_from(range(4)), unique=True), min_size=1, max_size=4))
-    keyed = data.draw(st.lists(st.booleans(), min_size=len(inputs), max_size=len(inputs)))
-    there = sorted({number for each in inputs for number in each})
-    rows = (
-        [(channels[number], at, b"") for at, number in enumerate(data.draw(st.lists(st.sampled_from(there))))]
-        if there
-        else []
-    )
-    readers = [
-        [(channels[number], partial(_numbers, keys)) for number in each]
-        for each, keys in zip(inputs, keyed, strict=True)
-    ]
-    found = list(Columns(readers).in_order(Batch(rows)))
-    assert found == [
-        (index, row, row[1], row[1] if keyed[index] else None)
-        for row in rows
-        for index, each in enumerate(inputs)
-        if row[0].id in each
-    ]
 
 
 @given(sizes=st.lists(st.integers(0, 5000), max_size=8), large=st.booleans())

@@ -135,21 +135,6 @@ def test_an_idl_that_nests_without_end_leaves_the_type_unknown(text):
     assert begins_with_header(_channel(text, form="ros2idl")) is None
 
 
-def test_a_count_that_lies_in_a_ros1_message_is_not_counted_down():
-    poses = _channel(
-        f"{_HEADER}Pose[] poses\n{_RULE}MSG: rig_msgs/Pose\nfloat64 x\nfloat64 y\n",
-        encoding=Encoding.ROS1,
-        form="ros1msg",
-    )
-    convert = converter(poses)
-    header = struct.pack("<IIII", 1, 5, 6, 0)
-    whole = convert(header + struct.pack("<Idd", 1, 1.0, 2.0))
-    assert whole is not None
-    assert struct.unpack_from("<dd", whole, len(whole) - 16) == (1.0, 2.0)
-    for count in (2, 20, 2**31, 2**32 - 1):
-        assert convert(header + struct.pack("<Idd", count, 1.0, 2.0)) is None
-
-
 def test_a_count_that_lies_is_not_counted_down_on_the_way_to_a_field():
     text = f"{_HEADER}Pose[] poses\nPose[1000] more\nuint32 n\n{_RULE}MSG: rig_msgs/Pose\nfloat64 x\nfloat64 y\n"
     read = value_reader(_channel(text), "n")

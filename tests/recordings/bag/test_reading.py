@@ -19,13 +19,12 @@ import numpy as np
 import pytest
 import zstandard
 from mcap.writer import IndexType
-from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
 from syncrelay.errors import BagError
-from syncrelay.recordings.bag import Encoding, open_recording
+from syncrelay.recordings.bag import open_recording
 from tests.recordings.bag.damage import FRAMES, KINDS, mcap, ros1
-from tests.recordings.bag.making import BEST_EFFORT, as_ros1, rig, write_mcap, write_ros1, write_rosbag2
+from tests.recordings.bag.making import as_ros1, rig, write_mcap, write_ros1, write_rosbag2
 from tests.recordings.bag.reading import read
 from tests.ros.cdr_messages import IMAGE, header, serialize
 from tests.ros.frames import Frame
@@ -121,17 +120,6 @@ def test_a_folder_may_be_named_by_its_metadata(tmp_path):
     assert read(_rosbag2()(tmp_path) / "metadata.yaml") == (FRAMES, [], [])
 
 
-@pytest.mark.parametrize("make", [mcap(), mcap(use_chunking=False)], ids=["mcap", "mcap loose"])
-def test_of_a_file_that_is_cut_off_what_is_whole_is_read(make, tmp_path):
-    path = make(tmp_path)
-    content = path.read_bytes()
-    path.write_bytes(content[: len(content) // 2])
-    frames, (fault,), _ = read(path)
-    assert 0 < len(frames) < len(FRAMES)
-    assert frames == FRAMES[: len(frames)]
-    assert "cut off or damaged at byte" in fault
-
-
 @pytest.mark.parametrize("change", ["never closed", "cut off"])
 def test_a_ros1_bag_without_an_index_is_refused_with_the_command_that_makes_one(change, tmp_path):
     path = ros1()(tmp_path)
@@ -171,18 +159,6 @@ def test_of_what_rosbags_has_no_words_for_no_exception_is_shown(tmp_path):
     assert fault == "damaged; read as far as possible: the records do not fit together"
 
 
-def test_a_ros1_bag_is_read_up_to_a_chunk_that_is_damaged(tmp_path):
-    path = ros1(Ros1Writer.CompressionFormat.BZ2)(tmp_path)
-    content = bytearray(path.read_bytes())
-    at = content.index(b"BZh", len(content) // 2)
-    content[at : at + 20] = bytes(20)
-    path.write_bytes(content)
-    frames, (fault,), _ = read(path)
-    assert [frame[:3] for frame in frames] == [frame[:3] for frame in FRAMES[: len(frames)]]
-    assert 0 < len(frames) < len(FRAMES)
-    assert "damaged; read as far as possible" in fault
-
-
 def test_a_compressed_file_that_is_cut_off_is_read_as_far_as_it_goes(tmp_path):
     path = _packed(ros1(), ".bz2", lambda content: bz2.compress(content)[:-200])(tmp_path)
     with pytest.raises(BagError, match=r"rig\.bag\.bz2: cut off or damaged"):
@@ -219,19 +195,6 @@ def test_of_several_files_those_that_cannot_be_read_are_said(tmp_path):
     frames, faults, _ = read(folder)
     assert frames == FRAMES[: len(frames)]
     assert faults == [f"{folder}/rig_2.mcap: is empty"]
-
-
-def test_qos_and_definitions_are_those_that_were_recorded(tmp_path):
-    for plugin in StoragePlugin:
-        folder = write_rosbag2(tmp_path / plugin.name, FRAMES, plugin=plugin, qos=[BEST_EFFORT])
-        recording = open_recording([str(folder)])
-        for channel in recording.channels:
-            assert channel.definition is not None
-            assert (channel.encoding, channel.definition.format) == (Encoding.CDR, "ros2msg")
-            assert "geometry_msgs/Vector3 vector" in channel.definition.text
-            (profile,) = channel.qos
-            assert (profile.reliability, profile.depth, profile.liveliness) == ("best_effort", 5, "automatic")
-        recording.close()
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,10 @@ from pathlib import Path
 
 import pytest
 import yaml
-from mcap.reader import make_reader
 from rosbags.interfaces import ConnectionExtRosbag2, QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 
-from syncrelay.config import AUTO, QosOverrides, QosPreset
-from syncrelay.config.profile import PRESETS, Profile, matched
+from syncrelay.config.profile import PRESETS
 from syncrelay.errors import OutputError
 from syncrelay.recordings.bag.mcap_output import McapOutput
 from syncrelay.recordings.bag.qos import read_profiles, write_profile
@@ -17,10 +15,6 @@ from syncrelay.recordings.bag.replay import replay
 from syncrelay.recordings.bag.writing import SetWriter
 from tests.recordings.bag.making import (
     BEST_EFFORT,
-    CUSTOM,
-    CUSTOM_STORE,
-    CUSTOM_TEXT,
-    blip,
     rig,
     rig_file,
     write_mcap,
@@ -29,10 +23,8 @@ from tests.recordings.bag.making import (
 from tests.recordings.bag.making import write_rosbag2 as write_folder
 from tests.recordings.bag.reading import bound
 from tests.ros.cdr_messages import STORE, VECTOR, stamp_of, with_stamp
-from tests.ros.configs import inputs
 from tests.ros.frames import Frame
 from tests.ros.manifests import read
-from tests.ros.streams import BEGIN, MS, at, merged
 
 _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
 _RIG = rig(10)
@@ -111,25 +103,6 @@ def test_messages_of_a_ros1_bag_are_written_as_ros2_has_them(restamp, tmp_path):
         assert {each.digest for each in reader.connections} == {STORE.hash_rihs01(VECTOR)}
 
 
-def test_a_type_that_nothing_here_knows_keeps_its_recorded_definition(tmp_path):
-    times = [BEGIN + 100 * n * MS for n in range(5)]
-    blips = [Frame("/camera", CUSTOM, time, blip(time, seen=0)) for time in times]
-    frames = merged(blips, at("/lidar", *(100 * n for n in range(5))))
-    written = _written(
-        write_mcap(tmp_path / "rig.mcap", frames, store=CUSTOM_STORE),
-        tmp_path / "out.mcap",
-        topics=inputs({"/camera": CUSTOM, "/lidar": VECTOR}),
-        max_wait="0ms",
-    )
-    assert _payloads(written, "/front/camera") == _payloads(frames, "/camera")
-    with (tmp_path / "out.mcap").open("rb") as file:
-        summary = make_reader(file).get_summary()
-        assert summary is not None
-        schemas = summary.schemas.values()
-    (schema,) = (schema for schema in schemas if schema.name == CUSTOM)
-    assert schema.data.decode().startswith(CUSTOM_TEXT)
-
-
 def test_outputs_without_a_set_are_there_too(tmp_path):
     assert _written(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out", slop="1ms") == []
     with Reader(tmp_path / "out") as reader:
@@ -162,21 +135,6 @@ def test_nothing_is_overwritten(tmp_path):
         _written(bag, bag)
     with pytest.raises(OutputError, match=r"cannot be written: .*none is not a folder"):
         _written(bag, tmp_path / "none" / "out.mcap")
-
-
-@pytest.mark.parametrize(
-    ("asked", "offered", "profile"),
-    [
-        (AUTO, [], Profile(depth=100)),
-        (AUTO, [PRESETS["sensor_data"], Profile()], Profile(depth=100, reliability="best_effort")),
-        (AUTO, [PRESETS["action_status_default"]], Profile(depth=100, durability="transient_local")),
-        (QosPreset("sensor_data"), [Profile()], PRESETS["sensor_data"]),
-        (QosOverrides(depth=3), [PRESETS["sensor_data"]], Profile(depth=3, reliability="best_effort")),
-        (QosOverrides.model_validate({"deadline": "1s"}), [], Profile(depth=100, deadline=1_000_000_000)),
-    ],
-)
-def test_outputs_offer_what_the_relay_would(asked, offered, profile):
-    assert matched(asked, offered) == profile
 
 
 def test_profiles_are_read_from_every_version_of_the_metadata():
@@ -234,14 +192,3 @@ def test_the_presets_are_those_of_rclpy():
         for key in ("deadline", "lifespan", "liveliness_lease_duration"):
             assert getattr(theirs, key).nanoseconds == getattr(ours, key)
         assert theirs.depth == ours.depth
-
-
-def test_where_sets_are_restamped_a_payload_without_a_place_for_a_stamp_is_malformed(tmp_path):
-    cut = Frame("/camera", VECTOR, _RIG[3].time + 1, _RIG[3].payload[:8])
-    frames = sorted([*_RIG, cut], key=lambda frame: frame.time)
-    topics = inputs(_PAIR, stamp="receive")
-    written = _written(
-        write_mcap(tmp_path / "rig.mcap", frames), tmp_path / "out.mcap", topics=topics, restamp="earliest"
-    )
-    assert len(_payloads(written, "/front/lidar")) > 5
-    assert all(len(frame.payload) == len(_RIG[0].payload) for frame in written)

@@ -132,18 +132,6 @@ def test_only_the_fields_asked_for_are_given():
     assert row == {"header": {"stamp": {"sec": 7}}, "angular_velocity": {"x": 1.0, "y": 2.0, "z": 3.0}}
 
 
-def test_any_field_may_be_asked_for_alone():
-    """All fields of the types of ROS 2, or of a quarter of them, one after another, also within arrays."""
-    asked = 0
-    for name in [*_JAZZY.fielddefs][:: chosen(short=4, long=1)]:
-        drawn = drawn_messages(_JAZZY, name, random.Random(name), count=3)
-        for field in drawn.values[0] if drawn.values else {}:
-            found = decoder(_JAZZY, name, field).decode(drawn.payloads).to_pylist()
-            assert repr(found) == repr([{field: each[field]} for each in drawn.values]), (name, field)
-            asked += 1
-    assert asked > chosen(short=100, long=500)
-
-
 @pytest.mark.parametrize(
     ("path", "told"),
     [

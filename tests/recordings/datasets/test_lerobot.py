@@ -207,27 +207,6 @@ def test_a_video_has_the_same_bytes_each_time(tmp_path):
     assert len(contents) == 1
 
 
-def test_a_frame_is_the_set_that_is_nearest_to_its_time(tmp_path):
-    # 30 Hz to 10: two of three sets are left out; later two frames have no set of their own.
-    stamps = [0, 33, 67, 100, 133, 167, 200, 233, 267, 300, 600]
-    bag = drive(tmp_path / "a.mcap", stamps)
-    facts = written(tmp_path, bag)
-    actions = [row[0] for row in table(tmp_path)["action"].to_pylist()]
-    assert actions == pytest.approx([0, 1, 2, 3, 3, 6, 6])
-    assert facts["episodes"]["a"] == {
-        "frames": 7,
-        "held": 2,
-        "left_out": 6,
-        "unusable": {},
-        "farthest_ns": 100_000_000,
-        "problems": [],
-    }
-    assert [
-        np.abs(pixels - picture(stamp)).mean() < CLOSE
-        for (_, pixels), stamp in zip(frames(tmp_path), [0, 100, 200, 300, 300, 600, 600], strict=True)
-    ] == [True] * 7
-
-
 @pytest.mark.parametrize("fps", [1, 7, 10, 30, 1000])
 def test_frames_stand_at_fixed_distances_and_show_what_is_nearest(fps):
     random = np.random.default_rng(fps)
@@ -319,20 +298,6 @@ def test_a_vector_of_one_value_is_a_number_and_no_video_is_no_fault(tmp_path):
     assert info["video_path"] is None
     assert info["features"]["action"]["shape"] == [1]
     assert info["features"]["observation.state"]["names"][:2] == ["joints.pan.position", "joints.lift.position"]
-
-
-@pytest.mark.parametrize(
-    ("encoding", "pixels", "shown"),
-    [
-        ("bgr8", np.full((48, 64, 3), (0, 100, 200), np.uint8), (200, 100, 0)),
-        ("mono8", np.full((48, 64), 77, np.uint8), (77, 77, 77)),
-        ("rgba8", np.full((48, 64, 4), (200, 100, 0, 9), np.uint8), (200, 100, 0)),
-    ],
-)
-def test_images_of_every_encoding_are_shown_in_their_colours(tmp_path, encoding, pixels, shown):
-    instead = {("/camera", stamp): image(stamp, encoding=encoding, pixels=pixels) for stamp in (0, 100, 200)}
-    written(tmp_path, drive(tmp_path / "a.mcap", (0, 100, 200), instead=instead))
-    assert all(np.abs(found - shown).mean() < CLOSE for _, found in frames(tmp_path))
 
 
 SIZED = np.zeros((32, 64, 3), np.uint8)
