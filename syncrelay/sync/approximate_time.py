@@ -7,8 +7,6 @@ from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
 from syncrelay.sync.policy import Queued, of_required
 
-_NO_PIVOT = -1
-
 _STEPS = 8
 """A search strides only after this many single steps. Most searches take fewer, and a stride costs several steps."""
 
@@ -83,7 +81,6 @@ class ApproximateTime(Queued):
         # (stamp, place) of the head of each input that has one, the earliest first.
         self._heads: list[tuple[int, int]] = []
         self.waits_started = 0
-        self._pivot_stamp = self._candidate_start = self._candidate_end = self._proof_end = 0
         self._reset()
 
     def for_required(self, required: Sequence[bool]) -> tuple["ApproximateTime", OptionalInputs]:
@@ -135,7 +132,7 @@ class ApproximateTime(Queued):
 
     def _forget_candidate(self) -> None:
         """Forget the candidate: the search begins again at the front of the queues."""
-        self._pivot = _NO_PIVOT
+        self._pivot: int | None = None
         self._cursors = [0] * self.n_inputs
         heads = []
         for place, stamps in enumerate(self._stamps):
@@ -160,7 +157,7 @@ class ApproximateTime(Queued):
     def _overflow(self, place: int, outcomes: list[Outcome]) -> list[Outcome]:
         self._losses.lose(place, self._stamps[place][0])
         self._overflowed.add(place)
-        had_candidate = self._pivot != _NO_PIVOT
+        had_candidate = self._pivot is not None
         if had_candidate:
             self._forget_candidate()
         self._drop_oldest(place, 1, DropReason.OVERFLOW, outcomes)
@@ -169,7 +166,7 @@ class ApproximateTime(Queued):
     def _search_again(self, outcomes: list[Outcome]) -> list[Outcome]:
         """Search after a candidate was forgotten. If there is one again, the wait for a better one goes on."""
         self._search(outcomes)
-        if self._pivot == _NO_PIVOT:
+        if self._pivot is None:
             self.waits_ended = self.waits_started
         return outcomes
 
@@ -186,7 +183,7 @@ class ApproximateTime(Queued):
             end, latest = heads[-1]
             if overflowed:
                 self._excuse_all_but(latest)
-            if self._pivot == _NO_PIVOT:
+            if self._pivot is None:
                 if end - start > self._slop or overflowed:
                     self._drop_heads(outcomes)
                     continue
@@ -235,7 +232,7 @@ class ApproximateTime(Queued):
         if its input overflowed. The last message of an input is never passed, as that would end the search.
         """
         end, latest = self._heads[-1]
-        if self._pivot != _NO_PIVOT:
+        if self._pivot is not None:
             if end < self._proof_end:
                 self._pass_until(min(self._pivot_stamp, *self._last_stamps(end)))
             return

@@ -73,8 +73,7 @@ class ApproximateTimeEager(Queued):
         while (firsts := [stamps[0] for stamps in self._stamps if stamps]) and min(firsts) < max(firsts) - self._slop:
             near = max(firsts) - self._slop
             for queue in self._queues:
-                if queue.stamps and queue.stamps[0] < near:
-                    outcomes += queue.drop(bisect_left(queue.stamps, near), DropReason.TOO_FAR)
+                outcomes += queue.drop(bisect_left(queue.stamps, near), DropReason.TOO_FAR)
 
     def _match(self, stamp: int, outcomes: list[Outcome]) -> None:
         if max(map(len, self._stamps)) == 1:

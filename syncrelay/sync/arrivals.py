@@ -1,5 +1,6 @@
 """Whether a message that arrives is late, of the time before a jump, or of use: by the stamps of its input."""
 
+import sys
 from collections.abc import Sequence
 
 from syncrelay.sync.messages import Message
@@ -8,8 +9,8 @@ JUMP_NS = 1_000_000_000
 """If a stamp falls by more than this, a recording was looped or a clock was reset; the message is not just late."""
 
 _UNSEEN = 0
-_NOT_YET = 1 << 62
-_NEVER = -(1 << 62)
+_NOT_YET = sys.maxsize
+_NEVER = -sys.maxsize
 
 
 class Arrivals:
@@ -27,7 +28,6 @@ class Arrivals:
         self._offsets = offsets_ns
         self.newest = [_UNSEEN] * len(offsets_ns)
         self._given = [_NEVER] * len(offsets_ns)
-        self._jumped = 0
         self.forget()
 
     def forget(self) -> None:

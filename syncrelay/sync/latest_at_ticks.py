@@ -185,9 +185,7 @@ class LatestAtTicks(Queued):
         if max_age is not None:
             expired = bisect_left(queue.stamps, next_time - max_age)
             drops = queue.drop(expired, DropReason.EXPIRED)
-        superseded = bisect_right(queue.stamps, next_time) - 1
-        if superseded > 0:
-            drops += queue.drop(superseded, DropReason.SUPERSEDED)
+        drops += queue.drop(max(0, bisect_right(queue.stamps, next_time) - 1), DropReason.SUPERSEDED)
         if stamp <= next_time:
             return drops
         tick, position = self.ticks.first_from(stamp), bisect_left(queue.stamps, stamp)

@@ -66,7 +66,7 @@ class Policy(Protocol):
 
     def release_oldest(self) -> Sequence[Outcome]:
         """End the oldest wait. What waited leaves as it is, as a set if it can be one."""
-        return ()
+        raise AssertionError("no message of this policy waits")
 
     def flush(self, reason: DropReason) -> list[Drop]:
         """Drop everything that is buffered, input by input, oldest first, and be as new."""

@@ -87,8 +87,7 @@ class Losses:
         """Note that the queue of `place` dropped its oldest message, of this stamp."""
         lost = self._lost[place]
         insort(lost, stamp)
-        if len(lost) > 2 * LONGEST_QUEUE:
-            del lost[:LONGEST_QUEUE]
+        del lost[:-LONGEST_QUEUE]
 
     def miss(self, place: int, stamps: Sequence[int], wanted: int, *, before: int, after: int) -> None:
         """Note that a message of stamp `wanted` found only newer ones in this queue, `stamps`.

@@ -15,7 +15,7 @@ class Thinning:
     and jitters. In any length of time, at most two sets more pass than it has periods.
     """
 
-    __slots__ = ("_every", "_first", "_period", "_seen", "_slot", "_withheld")
+    __slots__ = ("_every", "_first", "_next_slot", "_period", "_seen", "_withheld")
 
     def __init__(self, *, n_inputs: int, repeats: bool, every: int, min_set_period_ns: int | None) -> None:
         if every < 1 or (min_set_period_ns is not None and min_set_period_ns < 1):
@@ -45,7 +45,7 @@ class Thinning:
     def _reset(self) -> None:
         self._seen = 0
         self._first: int | None = None
-        self._slot = -1
+        self._next_slot = 0
 
     def _passes(self, stamp: int) -> bool:
         self._seen += 1
@@ -56,9 +56,9 @@ class Thinning:
         if self._first is None:
             self._first = stamp
         slot = (stamp - self._first + self._period // _EARLY) // self._period
-        if slot <= self._slot:
+        if slot < self._next_slot:
             return False
-        self._slot = slot
+        self._next_slot = slot + 1
         return True
 
 
