@@ -49,7 +49,7 @@ globals()[sys.argv[1]]()
 """
 
 
-def _hanging(tmp_path: Path, where: str, since: str = "deferred") -> Process:
+def _hanging(tmp_path: Path, where: str, since: str) -> Process:
     environment = ros_environment(domain=0, folder=tmp_path)
     argv = [sys.executable, "-c", _HANGING, where, since]
     process = Process("hanging", argv, environment=environment, folder=tmp_path)
@@ -66,27 +66,25 @@ def _signal_twice(process: Process, first: signal.Signals, second: signal.Signal
 
 
 _ANYWHERE = ["python", "lock", "fifo", "library", "library_that_holds_all_of_python"]
+_TERM, _INT = signal.SIGTERM, signal.SIGINT
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=lambda number: number.name)
-@pytest.mark.parametrize("where", _ANYWHERE)
-def test_a_second_signal_ends_what_hangs(where: str, number: signal.Signals, tmp_path: Path):
-    assert _signal_twice(_hanging(tmp_path, where), number, number) == -number
-
-
-@pytest.mark.parametrize("where", ["python", "library"])
-def test_a_second_signal_ends_what_hangs_while_it_runs(where: str, tmp_path: Path):
-    assert _signal_twice(_hanging(tmp_path, where, "running"), signal.SIGINT, signal.SIGINT) == -signal.SIGINT
-
-
-@pytest.mark.parametrize("since", ["deferred", "running"])
-def test_the_second_may_be_another_than_the_first(since: str, tmp_path: Path):
-    hanging = _hanging(tmp_path, "python", since)
-    assert _signal_twice(hanging, signal.SIGINT, signal.SIGTERM) == -signal.SIGTERM
+@pytest.mark.parametrize(
+    ("where", "since", "first", "second"),
+    [
+        *((where, "deferred", number, number) for where in _ANYWHERE for number in (_TERM, _INT)),
+        *((where, "running", _INT, _INT) for where in ("python", "library")),
+        *(("python", since, _INT, _TERM) for since in ("deferred", "running")),
+    ],
+)
+def test_a_second_signal_ends_what_hangs(
+    where: str, since: str, first: signal.Signals, second: signal.Signals, tmp_path: Path
+):
+    assert _signal_twice(_hanging(tmp_path, where, since), first, second) == -second
 
 
 def test_the_second_may_be_another_though_the_handlers_turn_never_comes(tmp_path: Path):
-    hanging = _hanging(tmp_path, "library")
+    hanging = _hanging(tmp_path, "library", "deferred")
     hanging.send(signal.SIGINT)
     hanging.wait_until(lambda: not hanging.handles(signal.SIGINT), "the first signal to be taken")
     hanging.send(signal.SIGTERM)
