@@ -141,10 +141,7 @@ def without_shared_memory(stage: Stage) -> None:
     """Have all processes of a stage speak over UDP, as they do across machines and in containers."""
     profile = stage.folder / "loopback.xml"
     profile.write_text(_UDP_OVER_LOOPBACK)
-    stage.environment |= {
-        "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile),
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",
-    }
+    stage.environment |= {"FASTRTPS_DEFAULT_PROFILES_FILE": str(profile), "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
 
 
 WAYS = ("reliable", "reliable, fast_heartbeats", "best_effort")

@@ -127,11 +127,7 @@ class Stage:
 
     def start(self, name: str, argv: Sequence[str], *, stdin: int = subprocess.DEVNULL) -> Process:
         process = Process(
-            f"{name}-{len(self._processes)}",
-            argv,
-            environment=self.environment,
-            folder=self.folder,
-            stdin=stdin,
+            f"{name}-{len(self._processes)}", argv, environment=self.environment, folder=self.folder, stdin=stdin
         )
         self._processes.append(process)
         return process

@@ -74,11 +74,7 @@ def _stand_in(monkeypatch, name: str, function) -> None:
 
 _TAKE, _ARRAY_INIT = "rcl_take_serialized_message", "rcutils_uint8_array_init"
 _SET_ON_NEW_MESSAGE = "rcl_subscription_set_on_new_message_callback"
-_ARGUMENTS = {
-    _TAKE: (c_void_p,) * 4,
-    _ARRAY_INIT: (c_void_p, c_size_t, c_void_p),
-    _SET_ON_NEW_MESSAGE: (c_void_p,) * 3,
-}
+_ARGUMENTS = {_TAKE: (c_void_p,) * 4, _ARRAY_INIT: (c_void_p, c_size_t, c_void_p), _SET_ON_NEW_MESSAGE: (c_void_p,) * 3}
 
 
 def test_every_memory_comes_back_once_whatever_became_of_its_message(here):

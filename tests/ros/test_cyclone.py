@@ -207,9 +207,7 @@ _CASES = {
         {"liveliness": "manual_by_topic", "liveliness_lease_duration": 4 * _S},
     ),
     "best_most": Case(
-        {**_LATCHED, **_BY_TOPIC, "deadline": 30 * _S},
-        "best_available",
-        {**_LATCHED, **_BY_TOPIC, "deadline": 30 * _S},
+        {**_LATCHED, **_BY_TOPIC, "deadline": 30 * _S}, "best_available", {**_LATCHED, **_BY_TOPIC, "deadline": 30 * _S}
     ),
     "no_reliable": Case(
         _BEST_EFFORT,

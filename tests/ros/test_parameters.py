@@ -11,13 +11,7 @@ parameters = pytest.importorskip("syncrelay.ros.parameters")
 misplaced = parameters.misplaced
 
 # What launch files give every node, or a node of somebody else has.
-_OF_OTHERS = (
-    "robot_description",
-    "frame_id",
-    "camera.fps_limit",
-    "camera.slop",
-    "start_type_description_service",
-)
+_OF_OTHERS = ("robot_description", "frame_id", "camera.fps_limit", "camera.slop", "start_type_description_service")
 
 
 def test_a_key_of_the_file_is_named_once_and_a_parameter_of_another_node_never():

@@ -13,13 +13,7 @@ from syncrelay.recordings.bag.mcap_output import McapOutput
 from syncrelay.recordings.bag.qos import read_profiles, write_profile
 from syncrelay.recordings.bag.replay import replay
 from syncrelay.recordings.bag.writing import SetWriter
-from tests.recordings.bag.making import (
-    BEST_EFFORT,
-    rig,
-    rig_file,
-    write_mcap,
-    write_ros1,
-)
+from tests.recordings.bag.making import BEST_EFFORT, rig, rig_file, write_mcap, write_ros1
 from tests.recordings.bag.making import write_rosbag2 as write_folder
 from tests.recordings.bag.reading import bound
 from tests.ros.cdr_messages import STORE, VECTOR, stamp_of, with_stamp
