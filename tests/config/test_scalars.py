@@ -21,20 +21,7 @@ _SCHEMA: dict[str, Callable[[str], object]] = {
     r"\.(nan|NaN|NAN)": lambda _: math.nan,
 }
 _ODD = (
-    "nUll",
-    "yes",
-    "NO",
-    "on",
-    "y",
-    "-0x1F",
-    "0b11",
-    "1_000",
-    "12:30:45",
-    "2001-12-14",
-    ".",
-    "inf",
-    "20ms",
-    "١٢",
+    *["nUll", "yes", "NO", "on", "y", "-0x1F", "0b11", "1_000", "12:30:45", "2001-12-14", ".", "inf", "20ms", "١٢"],
     "1\n",
 )
 

@@ -19,38 +19,14 @@ NAMED = Listen("127.0.0.1", range(1), hosts=(ALIAS, "10.0.0.5", "fd00::5"))
 THIS_MACHINE = socket.gethostname().lower()
 
 LOOPBACK = ["localhost", "127.0.0.1", "127.0.0.53", "127.255.255.254", "[::1]", "[0:0:0:0:0:0:0:1]", "[::ffff:7f00:1]"]
-STRANGE = [
-    "evil.example",
-    "localhost.evil.example",
-    "evil-localhost",
-    "localhost..",
-    ".localhost",
-    "127.0.0.1.evil.example",
-    "127.0.0.1.nip.io",
-    "127.0.0.256",
-    "127.1",
-    "0x7f.0.0.1",
-    "2130706433",
-    "0177.0.0.1",
-    "0.0.0.0",  # noqa: S104  as a host that is asked for
-    "10.0.0.5",
-    "[fe80::1]",
-    "[::]",
-    "[::2]",
-    "[::1",
-    "::1",
-    "[localhost]",
-    "[127.0.0.1]",
-    "[::1%]",
-    "localhost@evil.example",
-    "evil.example@localhost",
-    "localhost:port",
-    "localhost:1:2",
-    "localhost:123456",
-    "localhost,evil.example",
-    "localh\u00f6st",
-    f"{THIS_MACHINE}.evil.example",
-]
+# Nothing is listened on here: 0.0.0.0 is a host that is asked for.
+_STRANGE = """
+evil.example  localhost.evil.example  evil-localhost  localhost..  .localhost  127.0.0.1.evil.example  127.0.0.1.nip.io
+127.0.0.256  127.1  0x7f.0.0.1  2130706433  0177.0.0.1  0.0.0.0  10.0.0.5  [fe80::1]  [::]  [::2]  [::1  ::1
+[localhost]  [127.0.0.1]  [::1%]  localhost@evil.example  evil.example@localhost  localhost:port  localhost:1:2
+localhost:123456  localhost,evil.example  localh\u00f6st
+"""
+STRANGE = [*_STRANGE.split(), f"{THIS_MACHINE}.evil.example"]
 
 
 def told(answer: bytes) -> bool:
