@@ -233,6 +233,21 @@ class Player:
         self._until(is_so, f"{buffered} buffered messages", lambda: noted)
         self._note("counts", *noted)
 
+    def sent(self, topic: str, *, all_came: bool = True, **by: int) -> None:
+        """Each node has sent so many messages on a topic, as the relay counts, and whether all came is as it is."""
+
+        def counted() -> InputFacts:
+            return next(each for report in self._reports() for each in report.facts.inputs if each.name == topic)
+
+        def told() -> dict[str, int]:
+            return {each.node.removeprefix("/"): each.sent_in_all for each in counted().graph.senders}
+
+        self._until(lambda: told() == by, f"the messages of {by} on {topic}", told)
+        each = counted()
+        came = [(sender.sent_in_all, sender.delivered_in_all) for sender in each.graph.senders]
+        assert sum(delivered for _, delivered in came) == each.counts.fed
+        assert all(sent == delivered for sent, delivered in came) is all_came, came
+
     def dropped(self, reason: str, count: int, name: str = "front") -> None:
         """So many messages of a group were dropped for a reason."""
 

@@ -37,7 +37,7 @@ class Script(NamedTuple):
     is_short: bool
     """Whether it is played on real DDS in `make test`, too."""
     blind: Sequence[str] = ()
-    """Which fields of Seen depend on the clock of a busy machine."""
+    """Which fields of Seen depend on chance, or on the clock of a busy machine."""
 
 
 def short(title: str, *steps: Step | tuple[Step, ...], blind: Sequence[str] = ()) -> Script:

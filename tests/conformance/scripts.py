@@ -176,6 +176,21 @@ _HISTORIES: Final = (
         do.endpoints("/front/a", publishers=1, subscribers=1)),
 )
 
+_SENT: Final = (
+    short("messages that a history of depth 1 gives up are counted",
+        _SENSORS, do.relay(_front(row("/a", qos={"depth": 1}), "/b")), do.ready(), do.feed("/a", 1),
+        *((do.write("/a", *range(begin, begin + 5)), do.sleep(0.05)) for begin in range(10, 110, 5)),
+        do.sent("/a", all_came=False, rig=101), do.feed("/b", 1), do.sent("/b", rig=1), blind=("notes",)),
+    short("what was published before it was asked for is no loss",
+        do.publisher("/a", durability="transient_local", depth=3), do.publisher("/b"), do.write("/a", *range(10)),
+        do.relay(PAIR), do.ready(), do.fed("/a", 3), do.sets(10, 20), do.sent("/a", rig=5), do.sent("/b", rig=2)),
+    short("a publisher that comes back is counted on, and each of two for itself",
+        _SENSORS, do.publisher("/a", by="other", name="other"), do.relay(PAIR), do.ready(), do.sets(10, 20, 30),
+        do.feed("other", 40, 50), do.sent("/a", rig=3, other=2), do.end("/a"), do.endpoints("/a", publishers=1),
+        do.publisher("/a"), do.endpoints("/a", publishers=2), do.ready(), do.sets(60, 70),
+        do.sent("/a", rig=5, other=2)),
+)
+
 _GRAPH: Final = (
     short("a publisher of another type is named",
         do.publisher("/a", of=POINT, by="other"), do.publisher("/b"), do.relay(PAIR),
@@ -412,4 +427,4 @@ _LIFE: Final = (
 )
 
 # fmt: on
-SCRIPTS: Final = (*_QOS, *_HISTORIES, *_GRAPH, *_MESSAGES, *_POLICIES, *_CLOCKS, *_LIFE)
+SCRIPTS: Final = (*_QOS, *_HISTORIES, *_SENT, *_GRAPH, *_MESSAGES, *_POLICIES, *_CLOCKS, *_LIFE)

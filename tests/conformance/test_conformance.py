@@ -2,6 +2,7 @@
 
 import multiprocessing
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,8 +16,15 @@ from tests.conformance.scripts import SCRIPTS
 from tests.conformance.seen import Seen
 from tests.conformance.simulated import SimulatedWorld
 from tests.faults.extent import IS_LONG
+from tests.ros.stage import IS_COMPILED
 
-_ON_DDS = [each for each in SCRIPTS if each.is_short or IS_LONG]
+# Without the compiled path, messages of several publishers are not told apart.
+_ON_DDS = [
+    each
+    for each in SCRIPTS
+    if (each.is_short or IS_LONG)
+    and (IS_COMPILED or not any(step.verb == "sent" and "other" in step.keys for step in each.steps))
+]
 
 
 def _titles(scripts) -> list[str]:
@@ -26,6 +34,11 @@ def _titles(scripts) -> list[str]:
 def _simulated(script: Script, folder: Path, seed: int = 1) -> Seen:
     with SimulatedWorld(seed) as world:
         return play(script, world, folder)
+
+
+def _as_far_as_told(script: Script, seen: Seen, expected: Seen) -> Seen:
+    """Leave out what depends on chance."""
+    return replace(seen, **{field: getattr(expected, field) for field in script.blind})
 
 
 @pytest.fixture(scope="module")
@@ -51,14 +64,12 @@ def real(tmp_path_factory) -> Iterator[Callable[[Script, Path], Seen]]:
 @pytest.mark.parametrize("script", SCRIPTS, ids=_titles(SCRIPTS))
 def test_the_simulator_shows_the_same_with_any_seed(script, tmp_path):
     one, other = (_simulated(script, tmp_path, seed) for seed in (1, 2))
-    assert one == other
+    assert one == _as_far_as_told(script, other, one)
 
 
 @pytest.mark.ros
 @pytest.mark.faults
 @pytest.mark.parametrize("script", _ON_DDS, ids=_titles(_ON_DDS))
 def test_real_dds_and_the_simulator_show_the_same(script, real, tmp_path):
-    seen, expected = real(script, tmp_path), _simulated(script, tmp_path)
-    for field in script.blind:
-        setattr(seen, field, getattr(expected, field))
-    assert seen == expected
+    expected = _simulated(script, tmp_path)
+    assert _as_far_as_told(script, real(script, tmp_path), expected) == expected

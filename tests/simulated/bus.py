@@ -173,6 +173,8 @@ class Reader(Endpoint):
         while self.queue:
             sample, received = self.queue.popleft()
             if not lifespan or self.participant.process.time_ns() - sample.sent <= lifespan:
+                if self.bus.taken is not None:
+                    self.bus.taken(self, sample)
                 return sample, received
         return None
 
@@ -438,6 +440,8 @@ class Bus:
         """When the first of two finds the second."""
         self.written: Callable[[Writer, Sample], object] | None = None
         """Called at each write."""
+        self.taken: Callable[[Reader, Sample], object] | None = None
+        """Called for each message that a reader takes."""
         self.may_make: Callable[[Endpoint], object] = lambda _: None
         """Called before each endpoint is made: what it raises, as a RefusedByDdsError, refuses that."""
 

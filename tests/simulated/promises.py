@@ -10,14 +10,14 @@ from math import ceil
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from syncrelay.explain import explanation
-from tests.simulated.bus import Sample, Writer
+from tests.simulated.bus import Reader, Sample, Writer
 from tests.simulated.faults import KINDS, concerns, is_felt
 from tests.simulated.plan import HEALED_S, NAMED_S, SETTLED_S, TYPE, Group, Plan, Step
 from tests.simulated.scheduler import SECOND
 from tests.simulated.world import World, identity
 
 if TYPE_CHECKING:
-    from syncrelay.explain import GroupReport
+    from syncrelay.explain import GroupReport, InputGraph
 
 # After what is odd, so long; sets may be missing so long before a fault began.
 _AGAIN_S: Final = 15.0
@@ -116,12 +116,19 @@ class Promises:
         self._judged: dict[str, float] = {}
         self._nameless: dict[tuple[str, str], float] = {}
         self._fed: dict[str, int] = {}
+        self._taken: dict[str, dict[Reader, dict[bytes, list[int]]]] = defaultdict(lambda: defaultdict(dict))
         world.bus.written = self._on_write
+        world.bus.taken = self._on_taken
         world.heard_write = self._on_heard
         world.drained = self._on_drained
 
     def _on_heard(self, topic: str, number: int) -> None:
         self._written[topic].setdefault(number, self.world.now)
+
+    def _on_taken(self, reader: Reader, sample: Sample) -> None:
+        relay = self.world.relay
+        if relay is not None and reader.participant.process is relay.process:
+            self._taken[reader.topic][reader].setdefault(sample.gid, []).append(sample.number)
 
     def _on_write(self, writer: Writer, sample: Sample) -> None:
         place = self.world.outputs.get(writer.topic)
@@ -169,6 +176,8 @@ class Promises:
             for each in report.facts.inputs:
                 counts = each.counts
                 left = counts.matched + sum(counts.dropped.values()) + counts.buffered
+                if is_last:
+                    self._look_for_miscounted(name, each.graph)
                 if counts.fed != left or (is_last and counts.buffered):
                     self.broken.append(f"{self.world.now:.2f} s: {name}: {each.name}: {counts} does not add up")
             first = explanation(report.findings)
@@ -186,6 +195,17 @@ class Promises:
             topic, seconds = (each for each in found.groups() if each is not None)
             if float(seconds) < 1.5 / (self.world.plan.hz * self.world.plan.sensor(topic).every):
                 self.broken.append(f"{self.world.now:.2f} s: {name}: {found[0]}, which is as usual")
+
+    def _look_for_miscounted(self, name: str, shown: "InputGraph") -> None:
+        """Look whether all that was sent and did not come is counted, of topics that the relay has had throughout."""
+        readers = self._taken[shown.name]
+        if len(readers) != 1 or self._happened({"configure_again"}, 0, self.world.now):
+            return
+        (numbers,) = readers.values()
+        told = [sum(each.sent_in_all for each in shown.senders), sum(each.delivered_in_all for each in shown.senders)]
+        truth = [sum(each[-1] - each[0] + 1 for each in numbers.values()), sum(map(len, numbers.values()))]
+        if told != truth:
+            self.broken.append(f"{self.world.now:.2f} s: {name}: {shown.name}: {truth} sent and delivered, told {told}")
 
     def _look_for_unjudged(self, name: str) -> None:
         now, before = self.world.now, self._judged[name]
