@@ -96,7 +96,8 @@ def _why_lost(graph: InputGraph, losing: Sequence[Sender]) -> tuple[str, str]:
         )
     return (
         f"they were lost on the way, and {names} no longer had them to send them again",
-        f"{_CHECK_NETWORK}; with a larger `depth`, {names} can send more of them again",
+        f"{_CHECK_NETWORK}, and whether another subscriber of {graph.name} hangs, which holds up all; with a larger"
+        f" `depth`, {names} can send more of them again",
     )
 
 

@@ -1,6 +1,7 @@
 """A network that loses, throttles and breaks between sensors and relay: fewer sets, no wrong one, and told why."""
 
 import json
+import re
 import subprocess
 import time
 from collections.abc import Iterator
@@ -48,11 +49,19 @@ class _Scene:
         self.source.pace(_HZ)
         self.witness.wait_for_sets(_HZ)
 
+    def _get(self, page: str) -> str:
+        """A page of the relay's, asked for on its machine."""
+        words = [*self.cable.enter(self.cable.second), "python3", "-c", _GET, f"{address(self.relay)}{page}"]
+        return subprocess.run(words, check=True, capture_output=True, text=True).stdout
+
+    def count(self, what: str) -> float:
+        """How many messages of all inputs were `sent`, `delivered` or `received`, by the metrics."""
+        found = re.findall(rf"^syncrelay_messages_{what}_total{{.*}} (.*)$", self._get("/metrics"), re.MULTILINE)
+        return sum(map(float, found))
+
     def state(self) -> dict[str, Any]:
-        """The group as /status has it, asked on the relay's machine."""
-        words = [*self.cable.enter(self.cable.second), "python3", "-c", _GET, f"{address(self.relay)}/status"]
-        done = subprocess.run(words, check=True, capture_output=True, text=True)
-        (group,) = json.loads(done.stdout)["groups"]
+        """The group as /status has it."""
+        (group,) = json.loads(self._get("/status"))["groups"]
         for each in group["inputs"]:
             assert each["received"] == each["matched"] + sum(each["dropped"].values()) + each["buffered"]
         return dict(group)
@@ -80,9 +89,11 @@ def test_a_network_that_loses_throttles_and_breaks(stage: Stage, cable: Cable, w
     reliability = go_way(stage, way)
     scene = _Scene(stage, cable, reliability)
     cable.lose(0.1)
+    before = scene.count("sent"), scene.count("delivered")
     lossy_hz = scene.run(_FAULT_S)
     if way in _TOLD:
         wait_until(lambda: _TOLD[way] in scene.codes(), "the loss to be told")
+    sent, delivered = scene.count("sent") - before[0], scene.count("delivered") - before[1]
     cable.lose_no_more()
     after_loss_s = scene.recover()
     # Of 100 messages a second of two topics, each of some 150 bytes on the wire, less than half comes through.
@@ -96,6 +107,10 @@ def test_a_network_that_loses_throttles_and_breaks(stage: Stage, cable: Cable, w
     cable.mend()
     after_cut_s = scene.recover()
     assert scene.state()["sets"] > 0
+    assert way != "best_effort" or 0.03 < (sent - delivered) / sent < 0.2
+    published = sum(scene.source.pace(0))
+    wait_until(lambda: scene.count("delivered") == scene.count("received"), "counts that agree")
+    assert scene.count("sent") <= published
     figures(
         f"network ({way}): 10 % lost: {lossy_hz:.0f} of {_HZ} sets a second; throttled to 100 kbit/s:"
         f" {throttled_hz:.0f}; cut for {_CUT_S} s: {cut_hz:.0f}, told as {', '.join(sorted(told))}; new sets"
