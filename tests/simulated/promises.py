@@ -30,6 +30,9 @@ _JUDGED_S: Final = 12.0
 _ABOUT_TO_SEND_S: Final = 4.5
 _HERE_S: Final = 8.0
 _NAMED_BY_S: Final = 45.0
+# What DDS refuses on a topic is asked for again no more often than this, in so long, and by each reload.
+_TRIES: Final = 12
+_TRIED_S: Final = 10.0
 # A lazy group sleeps so long after the last of those who listen has left.
 _ASLEEP_S: Final = 8.0
 # What is said of a group's sets is held against those of so long, if it was looked at all the while.
@@ -252,6 +255,7 @@ class Promises:
         for at, asked, answer in world.answers:
             if answer is None and at < plan.length - _ANSWERED_S:
                 self.broken.append(f"{at:.2f} s: ~/{asked} got no answer")
+        self.broken += self._pestered()
         for each in plan.groups:
             self.broken += self._wrong_sets(each)
             self.broken += self._missing_sets(each)
@@ -259,6 +263,13 @@ class Promises:
             self.broken += self._wrong_ticks(each)
             self.broken += self._false_findings(each)
         return self.broken
+
+    def _pestered(self) -> Iterator[str]:
+        for topic, times in self.world.refusals.items():
+            for first, last in zip(times, times[_TRIES:], strict=False):
+                if last - first < _TRIED_S and not self._happened({"reload_often"}, first - _TRIED_S, last):
+                    yield f"{last:.2f} s: {topic}: {_TRIES + 1} refusals since {first:.2f} s"
+                    return
 
     def _wrong_sets(self, group: Group) -> Iterator[str]:
         plan = self.world.plan

@@ -2,6 +2,7 @@
 
 import json
 import struct
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from functools import partial
 from math import inf
@@ -236,6 +237,7 @@ class World:
         """Why it makes nothing at all."""
         self.refused_output: str | None = None
         """The one output on which it makes nothing."""
+        self.refusals: dict[str, list[float]] = defaultdict(list)
         self.path = folder / "fusion.yaml"
         self.absent: set[str] = set()
         self.is_to_be_active = False
@@ -251,9 +253,11 @@ class World:
 
     def refused(self, topic: str) -> str | None:
         """Return why DDS makes nothing on a topic for the relay."""
-        if topic == self.refused_output:
-            return "no memory"
-        return self.refused_everywhere or (self.refusal if topic in self.outputs else None)
+        one = "no memory" if topic == self.refused_output else None
+        why = one or self.refused_everywhere or (self.refusal if topic in self.outputs else None)
+        if why is not None:
+            self.refusals[topic].append(self.now)
+        return why
 
     @property
     def now(self) -> float:

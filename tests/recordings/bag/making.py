@@ -59,12 +59,12 @@ def write_mcap(
         writer = McapWriter(file, **{"compression": CompressionType.NONE, **options})
         writer.start(profile)
         channels = {}
-        for frame in frames:
+        for number, frame in enumerate(frames):
             if frame.topic not in channels:
                 text, _ = store.generate_msgdef(frame.type_name, ros_version=2)
                 schema = writer.register_schema(frame.type_name, "ros2msg", text.encode())
                 channels[frame.topic] = writer.register_channel(frame.topic, "cdr", schema)
-            writer.add_message(channels[frame.topic], frame.time, frame.payload, frame.time)
+            writer.add_message(channels[frame.topic], frame.time, frame.payload, frame.time, number + 7)
         writer.finish()
     return path
 
