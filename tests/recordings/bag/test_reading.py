@@ -120,6 +120,13 @@ def test_a_folder_may_be_named_by_its_metadata(tmp_path):
     assert read(_rosbag2()(tmp_path) / "metadata.yaml") == (FRAMES, [], [])
 
 
+def test_a_file_that_the_metadata_names_and_that_is_gone_is_said(tmp_path):
+    folder = _ALL_KINDS["MCAP, split"](tmp_path)
+    names = "".join(f"\n  - day/rig_{number}.mcap" for number in range(4))
+    (folder / "metadata.yaml").write_text(f"rosbag2_bagfile_information:\n  relative_file_paths:{names}\n")
+    assert read(folder).faults == ["1 of the 4 files that metadata.yaml names is missing: rig_3.mcap"]
+
+
 @pytest.mark.parametrize("change", ["never closed", "cut off"])
 def test_a_ros1_bag_without_an_index_is_refused_with_the_command_that_makes_one(change, tmp_path):
     path = ros1()(tmp_path)
@@ -197,6 +204,18 @@ def test_of_several_files_those_that_cannot_be_read_are_said(tmp_path):
     assert faults == [f"{folder}/rig_2.mcap: is empty"]
 
 
+def _encrypted() -> bytes:
+    fields = (
+        b"op=\3",
+        b"index_pos=" + bytes(8),
+        b"conn_count=" + bytes(4),
+        b"chunk_count=" + bytes(4),
+        b"encryptor=aes",
+    )
+    header = b"".join(struct.pack("<I", len(each)) + each for each in fields)
+    return b"#ROSBAG V2.0\n" + struct.pack("<I", len(header)) + header + bytes(4)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
@@ -204,6 +223,7 @@ def test_of_several_files_those_that_cannot_be_read_are_said(tmp_path):
         ("empty.mcap", b"", "is empty"),
         ("old.bag", b"#ROSBAG V1.2\n", "is a bag of a format other than 2.0"),
         ("torn.mcap", b"\x89MCAP0\r\n\x01", "no message can be read: .*cut off or damaged at byte 8 of 9"),
+        ("hushed.bag", _encrypted(), "is encrypted, which is not supported"),
         ("torn.bag", b"#ROSBAG V2.0\n\x45\0\0\0", "its index cannot be read: .*rosbag reindex"),
         ("other.db3", b"SQLite format 3\0" + bytes(100), "cannot be read as a rosbag2 recording"),
     ],

@@ -263,11 +263,14 @@ def test_splits_behind_urls_are_one_recording_of_which_none_may_be_out_of_reach(
         open_recording(urls)
 
 
-def test_to_tell_and_to_complete_a_word_nothing_is_fetched(server):
+def test_to_tell_and_to_complete_a_word_nothing_is_fetched(server, tmp_path):
     url = server.url("/rig.mcap")
     assert is_recording(url)
     assert is_recording("s3://bucket/day/")
     assert not is_recording("/camera/image")
+    assert not is_recording(str(tmp_path))
+    (tmp_path / "rig.mcap").touch()
+    assert is_recording(str(tmp_path))
     assert list(COMPLETERS["BAG|TOPIC"](prefix=f"{url}/x", parsed_args=Namespace(bag=url, more=[]))) == []
     assert find(url) == [url]
     assert server.requests == []
