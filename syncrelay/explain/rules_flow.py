@@ -94,10 +94,10 @@ def _why_lost(graph: InputGraph, losing: Sequence[Sender]) -> tuple[str, str]:
             "they were sent by best effort and lost on the way",
             f"{_CHECK_NETWORK}; if {names} can publish as reliable, `qos: auto` has lost messages sent again",
         )
+    others = f"whether another subscriber of {graph.name} hangs, which holds up all"
     return (
         f"they were lost on the way, and {names} no longer had them to send them again",
-        f"{_CHECK_NETWORK}, and whether another subscriber of {graph.name} hangs, which holds up all; with a larger"
-        f" `depth`, {names} can send more of them again",
+        f"{_CHECK_NETWORK}, and {others}; with a larger `depth`, {names} can send more of them again",
     )
 
 
