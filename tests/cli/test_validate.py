@@ -91,17 +91,6 @@ def test_json_tells_of_files_together_in_which_the_problem_is(folder, environ):
     assert [problem["code"] for problem in front["problems"]] == ["duplicate_key", "bad_value"]
 
 
-def test_what_could_not_be_checked_is_noted_beside_the_file(folder, environ):
-    (folder / "opaque.yaml").write_text(
-        GOOD.replace("/a, type: sensor_msgs/msg/Image", "/a, type: dock_msgs/msg/Opaque")
-    )
-    done = run_here("validate", "opaque.yaml", folder=folder, environ=environ)
-    assert (done.returncode, done.stderr) == (0, "")
-    first, note = done.stdout.splitlines()[:2]
-    assert first == "opaque.yaml: ok, 1 group, 2 topics"
-    assert note.startswith("opaque.yaml:6:27: note: groups.front.topics[0].type: `dock_msgs/msg/Opaque` is installed ")
-
-
 def test_json_holds_every_file_and_every_problem(folder, environ):
     done = run_here("validate", "--format", "json", "good.yaml", "f.yaml", "none.yaml", folder=folder, environ=environ)
     assert (done.returncode, done.stderr) == (1, "")

@@ -68,15 +68,6 @@ def test_inputs_that_come_go_and_change_places_are_told_by_name(environ):
     assert (change.keys, change.removed, change.added, change.reordered) == ((), ("/b",), ("/d",), True)
 
 
-def test_a_type_that_another_group_writes_is_told(environ):
-    bare = group("rear", "/a", "/c").replace(", type: sensor_msgs/msg/Image", "", 1)
-    old, new = file(group("front", "/d", "/b"), bare), file(group("front", "/d", "/a"), bare)
-    changes = between(old, new, environ).groups
-    assert [(each.name, each.keys) for each in changes if each.name == "rear"] == [
-        ("rear", (KeyChange("type", None, "sensor_msgs/msg/Image", topic="/a"),))
-    ]
-
-
 @pytest.mark.parametrize(
     ("top", "restart", "sections"),
     [

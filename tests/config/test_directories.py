@@ -55,16 +55,6 @@ def test_files_that_are_mounted_by_links_are_read_once(folder, environ):
     assert [each.name for each in load("conf", environ=environ).groups] == ["front"]
 
 
-def test_a_directory_without_files_is_refused_beside_what_else_is_wrong(folder, environ):
-    (folder / "readme.txt").write_text("")
-    Path("bad.yaml").write_text("version: 2\n")
-    assert errors(environ, "conf/", "bad.yaml", "missing/") == [
-        "conf/: no *.yaml or *.yml file in this directory",
-        "bad.yaml:1:10: version: expected 1, the version of the format, found the number `2`",
-        "missing/: no such file",
-    ]
-
-
 def test_a_file_alone_in_a_directory_needs_groups_as_any_other(folder, environ):
     (folder / "node.yaml").write_text("version: 1\nnode: {name: relay}\n")
     assert errors(environ, "conf") == ["conf/node.yaml:1:1: groups: missing, expected one group or more"]

@@ -78,12 +78,3 @@ def test_at_every_key_a_number_without_end_is_refused_where_it_stands(number: st
         # A default may be refused for the group that it is used in.
         assert there[0].path in (place, place.replace("defaults", "groups.front")), str(raised.value)
         assert len(there[0].text) < 300
-
-
-@pytest.mark.parametrize("number", ["1000001", "2147483648", "18446744073709551616"])
-@pytest.mark.parametrize("place", ["groups.front.queue_size", "groups.front.every", "groups.front.topics[0].qos.depth"])
-def test_more_messages_than_dds_counts_are_refused(place: str, number: str, environ):
-    text = json.dumps(dict(_places())[place]).replace(_NUMBER, number)
-    with pytest.raises(ConfigError, match="expected 1000000 or less, found the number") as raised:
-        load_text(text, environ=environ)
-    assert raised.value.problems[0].path == place

@@ -53,15 +53,6 @@ def test_notes_say_that_they_are_none():
     assert render([note]) == "f.yaml: note: types not checked"
 
 
-def test_colour_is_there_when_asked_for_and_changes_no_text():
-    problem = Problem("f.yaml", "a.b", "text", "code", Span(1, 1, 1), "x: 1")
-    coloured = render([problem], colour=True)
-    assert "\033[31m^\033[0m" in coloured
-    for code in ("\033[1m", "\033[31m", "\033[34m", "\033[0m"):
-        coloured = coloured.replace(code, "")
-    assert coloured == render([problem])
-
-
 def test_nothing_from_outside_reaches_the_terminal_as_a_control():
     problem = Problem("f\033[2J.yaml", "", "is no file", "unreadable")
     assert "\033" not in render([problem])

@@ -60,24 +60,6 @@ def test_any_file_is_what_its_parts_are_together(seed: int):
     assert (parts.node, parts.listen, parts.diagnostics) == (whole.node, whole.listen, whole.diagnostics)
 
 
-def test_defaults_are_for_the_groups_of_their_own_file(environ):
-    config = together(
-        environ,
-        one=file(group("front", "/a", "/b"), top="defaults: {queue_size: 5}\n"),
-        two=file(group("rear", "/a", "/b"), top="defaults: {queue_size: 7}\n"),
-        three=file(group("left", "/a", "/b")),
-    )
-    assert [each.options.queue_size for each in config.groups] == [5, 7, 10]
-
-
-def test_a_file_may_have_the_node_alone(environ):
-    config = together(environ, one="version: 1\nnode: {name: relay}\ndiagnostics: null\n", two=FRONT)
-    assert (config.node.name, config.diagnostics, len(config.groups)) == ("relay", None, 1)
-    assert errors(environ, one="version: 1\nnode: {}\n", two="version: 1\n") == [
-        "one.yaml:1:1: groups: expected one group or more, found none"
-    ]
-
-
 @pytest.mark.parametrize("key", ["node: {}", "metrics: null", "diagnostics: {}"])
 def test_what_there_is_once_is_refused_twice_with_both_places(key, environ):
     name = key.partition(":")[0]

@@ -21,19 +21,6 @@ def test_messages_of_all_sources_leave_by_their_time_of_receipt():
     assert delivered == ["a", "A", "B", "b", "C"]
 
 
-def test_what_came_after_the_look_waits_for_the_next_one():
-    delivered: list[str] = []
-    backlog = Backlog()
-    slow, fast = _source(delivered), _source(delivered, (1, "a"), (6, "b"))
-    backlog.deliver([fast], 5)
-    assert delivered == ["a"]
-    assert backlog.held == {fast}
-    slow.messages.append(Named("A", 5))
-    backlog.deliver([slow], 10)
-    assert delivered == ["a", "A", "b"]
-    assert not backlog.held
-
-
 def test_a_clock_that_is_set_back_holds_up_no_source():
     delivered: list[str] = []
     backlog = Backlog()
@@ -53,17 +40,6 @@ def test_what_is_told_of_a_source_that_ends_is_told_no_more():
     backlog.deliver([failing], 5)
     backlog.forget(failing)
     assert not backlog.failed
-
-
-def test_a_flood_is_handed_on_in_batches_and_without_a_gap():
-    delivered: list[str] = []
-    backlog = Backlog()
-    flood = _source(delivered, *((n, f"{n}") for n in range(1000)))
-    backlog.deliver([flood], 1000)
-    assert 0 < len(delivered) < 1000
-    while backlog.held:
-        backlog.deliver([], 1000)
-    assert delivered == [f"{n}" for n in range(1000)]
 
 
 def test_a_slow_topic_gets_its_turn_in_a_flood():

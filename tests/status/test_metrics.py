@@ -46,16 +46,6 @@ def test_received_is_matched_and_dropped_and_waiting():
     assert value(found, "syncrelay_messages_total", **of_camera, outcome="matched") == 30
 
 
-def test_what_dds_lost_is_counted_beside_what_was_received():
-    report = working()
-    camera, lidar = report.facts.inputs
-    camera = replace(camera, graph=replace(camera.graph, lost=2, lost_in_all=7))
-    found = samples(relay(replace(report, facts=replace(report.facts, inputs=(camera, lidar)))))
-    assert value(found, "syncrelay_messages_lost_total", group="front", topic="/camera") == 7
-    assert value(found, "syncrelay_messages_lost_total", group="front", topic="/lidar") == 0
-    assert value(found, "syncrelay_messages_received_total", group="front", topic="/camera") == 34
-
-
 def test_what_each_node_sent_and_what_came_of_it_is_counted():
     report = working()
     camera, lidar = report.facts.inputs

@@ -129,35 +129,6 @@ def test_nothing_can_be_written(method):
         assert asked(address, "/status", method=method) == (405, "only GET\n")
 
 
-@pytest.mark.parametrize("path", ["/", "/status", "/tap", "/metrics", "/livez", "/no"])
-def test_head_sends_what_get_says_of_the_body_and_nothing_after_it(path):
-    with serving(HEALTHY) as address:
-        whole, head = (
-            sent(address, f"{method} {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
-            for method in ("GET", "HEAD")
-        )
-    assert head.endswith(b"\r\n\r\n")
-    assert head.count(b"\r\n\r\n") == 1
-    assert head.partition(b"\r\n")[0] == whole.partition(b"\r\n")[0]
-    assert b"Content-Length: " in head
-
-
-@pytest.mark.parametrize(
-    "garbage",
-    [
-        b"\x16\x03\x01\x02\x00\x01\x00\r\n\r\n",
-        b"GET\r\n\r\n",
-        b"GET / HTTP/9\x00\r\nHost\r\n\r\n",
-        b"\x00" * 90 + b"\r\n\r\n",
-    ],
-    ids=["a TLS hello", "a method alone", "a broken header", "zeros"],
-)
-def test_garbage_is_a_bad_request_and_the_server_lives_on(garbage):
-    with serving(HEALTHY) as address:
-        assert b" 400 Bad Request" in sent(address, garbage).partition(b"\r\n")[0]
-        assert asked(address, "/livez")[0] == 200
-
-
 def test_a_header_without_end_is_refused():
     with serving(HEALTHY) as address:
         endless = b"GET / HTTP/1.1\r\nHost: localhost\r\n" + b"X-Long: " + b"x" * 40_000

@@ -117,16 +117,6 @@ def test_sets_are_told_apart_by_colour_and_by_letter():
     assert letters["A"] != letters["B"]
 
 
-def test_a_window_has_the_newest_at_its_right_end_and_joints_of_any_width():
-    window = Window(head=400 * MS, width=32, column_ns=10 * MS)
-    assert drawn([a_set(100, 130), a_set(400, 200)], window) == [
-        " A                             B",
-        " ╰──╮      ╭───────────────────╯",
-        "    A      B",
-        "   30.0  200.0",
-    ]
-
-
 @pytest.mark.parametrize(
     ("recent", "column_ms"),
     [

@@ -192,12 +192,3 @@ def test_every_view_of_an_analysis_counts_alike_whatever_was_recorded(recording,
         if not group["suggestion"]["changes"]:
             queue_size = load_text(text).groups[0].options.queue_size
             assert by_value[queue_size] == group["suggestion"]["now"]
-
-
-def test_what_waits_at_the_end_leaves_at_its_own_time_however_late_the_recording_ends():
-    rows = [(0, 100 * MS, 100 * MS, ""), (1, 100 * MS, 100 * MS, "")]
-    topics = [*inputs(dict.fromkeys(_TOPICS[:2], VECTOR)), {"topic": "/c", "type": VECTOR, "required": False}]
-    text = config({"front": {"policy": "exact_time", "max_wait": "50ms", "topics": topics}})
-    recording = Made(rows)
-    recording.end = 60 * _SECOND
-    assert _replayed(recording, bind(load_text(text), recording))[0] == [((100 * MS, 100 * MS, None), 150 * MS)]

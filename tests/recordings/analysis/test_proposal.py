@@ -152,13 +152,3 @@ def test_a_queue_is_as_long_as_a_fast_topic_needs_beside_a_late_one(tmp_path):
     (group,) = load_text(text).groups
     assert group.options.queue_size > 10
     assert sets["fused"] == 90
-
-
-@pytest.mark.parametrize("frames", [[], at("/one", *range(0, 5000, 100))], ids=["few", "one"])
-def test_a_recording_with_nothing_to_match_is_named(frames, tmp_path):
-    path = write_mcap(tmp_path / "rig.mcap", [*frames, *at("/rare", 1)])
-    with (
-        closing(open_recording([str(path)])) as recording,
-        pytest.raises(NothingToMatchError, match="there is nothing to match"),
-    ):
-        propose(recording)

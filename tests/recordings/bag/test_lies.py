@@ -146,17 +146,6 @@ def test_a_message_of_no_channel_is_counted(tmp_path):
     assert read(path)[1] == [f"1 message {_STRAYS}"]
 
 
-@pytest.mark.parametrize("length", [2**20, 2**64 - 1])
-def test_an_mcap_record_that_is_no_message_and_ends_behind_its_chunk_is_said(length, tmp_path):
-    def change(content: bytearray) -> None:
-        at = content.index(_FIRST)
-        content[at : at + 9] = struct.pack("<BQ", Opcode.ATTACHMENT, length)
-
-    frames, (fault,), _ = read(_mcap(tmp_path, change, enable_crcs=False))
-    assert frames == []
-    assert fault.endswith("is damaged and left out: a record in it ends behind it")
-
-
 @pytest.mark.parametrize(("number", "place"), [(0, 0), (5, 11), (11, -1)])
 def test_a_chunk_of_a_wrong_checksum_is_left_out(number, place, tmp_path):
     """The flipped bit is in a payload, so that only the checksum can show it."""

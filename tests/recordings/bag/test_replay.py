@@ -5,9 +5,9 @@ import pytest
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag.replay import replay
 from syncrelay.sync import Drop, DropReason, Match
-from tests.recordings.bag.making import CUSTOM, CUSTOM_STORE, HEADERLESS, blip, rig, write_mcap, write_ros1
+from tests.recordings.bag.making import CUSTOM, CUSTOM_STORE, blip, rig, write_mcap, write_ros1
 from tests.recordings.bag.reading import bound
-from tests.ros.cdr_messages import STRING, TIME_REFERENCE, VECTOR, header, serialize, time
+from tests.ros.cdr_messages import TIME_REFERENCE, VECTOR, header, serialize, time
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
 from tests.ros.streams import BEGIN, MS, at, merged
@@ -115,16 +115,6 @@ def test_keys_are_read_from_ros2_and_ros1_payloads(tmp_path):
         group = {"policy": "equal_key", "key": key, "topics": topics}
         for path in (write_mcap(tmp_path / f"{key}.mcap", references), write_ros1(tmp_path / f"{key}.bag", references)):
             assert len(_sets(_replayed(path, group)[0])) == 4
-
-
-def test_headerless_messages_go_by_their_receive_time(tmp_path):
-    frames = [Frame(topic, HEADERLESS, BEGIN + n * MS, serialize(STRING, "x")) for n in (1, 200) for topic in _PAIR]
-    path = write_mcap(tmp_path / "rig.mcap", frames, store=CUSTOM_STORE)
-    topics = inputs(dict.fromkeys(_PAIR, HEADERLESS))
-    with pytest.raises(BagError, match="does not begin with a std_msgs/msg/Header"):
-        _replayed(path, _group(topics))
-    left, _ = _replayed(path, _group(inputs(dict.fromkeys(_PAIR, HEADERLESS), stamp="receive"), max_wait="0ms"))
-    assert _sets(left) == [(frames[0].time,) * 2, (frames[2].time,) * 2]
 
 
 def test_a_channel_that_is_not_of_ros_is_named(tmp_path):

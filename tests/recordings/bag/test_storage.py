@@ -253,16 +253,6 @@ def test_an_empty_file_is_said_to_be_empty(server):
         open_recording([server.url("/rig.mcap")])
 
 
-def test_splits_behind_urls_are_one_recording_of_which_none_may_be_out_of_reach(server, tmp_path):
-    for number in range(2):
-        served_as(server, write_mcap(tmp_path / f"rig_{number}.mcap", FRAMES[number::2]), f"/rig_{number}.mcap")
-    urls = [server.url(f"/rig_{number}.mcap") for number in range(3)]
-    with closing(open_recording([urls[0].replace("http", "HTTP"), urls[1]])) as recording:
-        assert len(list(chain.from_iterable(recording.batches(recording.channels)))) == len(FRAMES)
-    with pytest.raises(StorageError, match=r"rig_2\.mcap: no such file"):
-        open_recording(urls)
-
-
 def test_to_tell_and_to_complete_a_word_nothing_is_fetched(server, tmp_path):
     url = server.url("/rig.mcap")
     assert is_recording(url)

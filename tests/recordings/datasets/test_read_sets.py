@@ -1,6 +1,5 @@
 """Sets as record batches: the sets of `replay`, with the messages that were recorded."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -39,15 +38,6 @@ def rows_of(*args, **options):
     return [row for batch in read_sets(*args, **options) for row in times.rows_of(batch)]
 
 
-def test_a_row_tells_spans_with_offsets_and_its_newest_stamp(tmp_path):
-    bag = write_mcap(tmp_path / "bag.mcap", rig())
-    loaded = load_text(GROUP.format(more="").replace("/camera}", "/camera, offset: -3ms}"))
-    rows = rows_of(bag, loaded)
-    assert {row["span_ns"] for row in rows} == {0}
-    assert all(row["stamp"] == max(row["stamps"].values()) for row in rows)
-    assert {row["received"]["/lidar"] - row["stamps"]["/lidar"] for row in rows} == {5 * MS}
-
-
 def test_messages_leave_with_the_stamp_of_their_set(tmp_path):
     bag = write_mcap(tmp_path / "bag.mcap", rig())
     rows = rows_of(bag, config("restamp: earliest"))
@@ -74,16 +64,6 @@ def test_all_sets_come_whatever_the_size_of_a_batch(tmp_path):
     assert len(batches) > 3
     assert [row for batch in batches for row in times.rows_of(batch)] == whole
     assert len({batch.schema.serialize().to_pybytes() for batch in batches}) == 1
-
-
-def test_what_is_known_of_the_inputs_stands_in_the_schema(tmp_path):
-    bag = write_mcap(tmp_path / "bag.mcap", rig())
-    (batch,) = read_sets(bag, config())
-    told = json.loads(batch.schema.metadata[b"syncrelay"])
-    assert (told["group"], told["policy"]) == ("front", "approximate_time")
-    first = batch["/camera"][0].as_py()["header"]["frame_id"]
-    assert told["inputs"]["/camera"] == {"type": VECTOR, "offset_ns": 0, "frame_id": first}
-    assert batch.schema.field("/camera").metadata == {b"type": VECTOR.encode(), b"frame_id": first.encode()}
 
 
 def test_a_type_that_the_recording_does_not_define_is_named_and_raw_takes_it(tmp_path):

@@ -85,15 +85,6 @@ def test_a_list_names_a_recording_on_each_line(folder, monkeypatch):
     ]
 
 
-def test_results_are_no_recordings_of_the_command_that_makes_them(folder):
-    (folder / "out" / "x-0123456789abcdef").mkdir(parents=True)
-    (folder / "out" / "x-0123456789abcdef" / "sets.mcap").write_bytes(b"")
-    assert "out/x-0123456789abcdef/sets.mcap" not in found(folder, ".")
-    assert found(folder, "out", into="other") == ["out/x-0123456789abcdef/sets.mcap"]
-    with pytest.raises(BagError, match=r"out: names only results in .*out"):
-        found(folder, "out")
-
-
 @pytest.mark.parametrize(
     ("word", "told"),
     [
