@@ -56,18 +56,6 @@ def test_a_key_is_told_with_its_values_as_they_are_written(old, new, expected, e
     assert keys(before, after, environ) == expected
 
 
-def test_a_key_of_defaults_is_told_in_the_groups_that_have_it(environ):
-    rear = group("rear", "/a", "/b", keys="queue_size: 3")
-    found = between(file(FRONT, rear), file(FRONT, rear, top="defaults: {queue_size: 7}\n"), environ)
-    assert [(each.name, each.keys) for each in found.groups] == [("front", (KeyChange("queue_size", None, "7"),))]
-
-
-def test_inputs_that_come_go_and_change_places_are_told_by_name(environ):
-    old, new = file(group("front", "/a", "/b", "/c")), file(group("front", "/c", "/d", "/a"))
-    (change,) = between(old, new, environ).groups
-    assert (change.keys, change.removed, change.added, change.reordered) == ((), ("/b",), ("/d",), True)
-
-
 @pytest.mark.parametrize(
     ("top", "restart", "sections"),
     [

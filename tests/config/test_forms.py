@@ -1,8 +1,6 @@
 """Files that cannot begin with a comment, or are too large to keep: their form is at fault, or unusual."""
 
-import io
 import os
-import sys
 
 import pytest
 import yaml
@@ -126,12 +124,6 @@ def text_of(path):
     with pytest.raises(ConfigError) as raised:
         load(path, environ={})
     return str(raised.value)
-
-
-def test_a_dash_is_standard_input(monkeypatch, environ):
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(GOOD.replace("exact", "exakt").encode())))
-    with pytest.raises(ConfigError, match=r"^<stdin>:4:13: "):
-        load("-", environ=environ)
 
 
 @given(st.integers(0, len(GOOD)), st.integers(0, 12), st.text(alphabet="ab:- \n[]{}\"'&*|,", max_size=6))

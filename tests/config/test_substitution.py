@@ -49,12 +49,6 @@ def test_an_unset_variable_and_what_only_looks_like_one_are_refused(text):
         substitute(text, {"A": "a"})
 
 
-def test_a_number_from_the_environment_is_a_number(environ):
-    assert queue_size("${Q}", environ, Q="7") == 7
-    assert queue_size("${Q:-8}", environ) == 8
-    assert queue_size("1${Q}", environ, Q="7") == 17
-
-
 def test_a_variable_in_quotes_is_read_as_without_for_braces_leave_no_other_way(environ):
     assert queue_size('"${Q}"', environ, Q="7") == 7
 

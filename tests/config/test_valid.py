@@ -37,13 +37,6 @@ def test_a_file_that_says_nothing_of_it_listens_on_this_machine_alone(environ):
     assert config.listen == Listen("127.0.0.1", range(9464, 9474), is_asked_for=False)
 
 
-def test_an_optional_input_that_nothing_waits_for_needs_no_max_wait(environ):
-    group = load(str(FOLDER / "optional_state.yaml"), environ=environ).groups[0]
-    assert [topic.required for topic in group.topics] == [True, False]
-    assert group.options.max_wait is None
-    assert group.engine().next_deadline() is None
-
-
 def test_a_duration_of_the_middleware_has_a_largest_value(environ):
     text = (FOLDER / "shared_topic.yaml").read_text()
     no_limit = "qos: {lifespan: {sec: 9223372036, nsec: 854775807}, deadline: {sec: 9223372036854, nsec: 0}}"

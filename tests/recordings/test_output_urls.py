@@ -153,10 +153,3 @@ def test_the_table_of_facts_is_written_to_a_store(folder):
     ]
     assert tables[0].num_rows == 2
     assert tables[0] == tables[1]
-
-
-def test_a_store_with_other_files_is_no_place_for_results(folder):
-    (folder / "store" / "mine").mkdir()
-    (folder / "store" / "mine" / "notes").write_text("")
-    done = stored(folder, "export", "rig.mcap", "--config", "f.yaml", "-o", "store://mine/")
-    assert (done.returncode, "holds files and no _ledger.jsonl" in done.stderr) == (1, True)

@@ -28,6 +28,7 @@ def test_auto_takes_the_most_that_all_publishers_offer():
             latched = all(each.durability == "transient_local" for each in offered)
             assert (profile.durability == "transient_local") is latched
     assert not is_known(AUTO, [])
+    assert matched(AUTO, []) == Profile(depth=100)
 
 
 @pytest.mark.parametrize(

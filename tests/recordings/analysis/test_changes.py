@@ -35,14 +35,6 @@ def test_changes_keep_the_line_breaks_of_a_file():
     assert changed == _FILE.replace("slop: 10ms", "slop: 25ms").replace("\n", "\r\n")
 
 
-def test_a_new_policy_takes_with_it_what_it_does_not_have():
-    changed = with_changes(_FILE, [Change("front", None, "policy", "exact_time", "")])
-    for gone in ("slop", "age_penalty", "min_period"):
-        assert gone not in changed
-    assert "policy: exact_time" in changed
-    assert "# the camera" in changed
-
-
 def test_a_patch_holds_the_changes_alone():
     changes = [Change("front", None, "slop", "25ms", ""), Change("front", 1, "stamp", "receive", "")]
     assert patch(changes, {"front": ["/a", "/b"]}) == (
@@ -80,9 +72,3 @@ def test_a_merged_value_is_changed_in_the_group_alone(group: str):
     assert [line for line in changed.splitlines() if line not in _SHARED.splitlines()] == ["    slop: 25ms  # better"]
     begin = changed.index(f"  {group}:")
     assert begin < changed.index("slop: 25ms") == changed.index("slop: 25ms", begin)
-
-
-def test_two_spaces_stand_before_a_comment_beside_one_that_stands_further_left():
-    text = "groups:\n  front:\n    policy: x\n    queue_size: 10\n    slop: 9ms  # mine\n"
-    changed = with_changes(text, [Change("front", None, "queue_size", 30, "why")])
-    assert changed == text.replace("10", "30  # why")

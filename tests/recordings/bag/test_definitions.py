@@ -123,25 +123,10 @@ def test_annotations_comments_and_includes_of_idl_do_not_matter():
         assert fields("rig_msgs/Blip") == {f"x{n}": "uint8" for n in range(1000)}
 
 
-def test_comments_of_a_message_do_not_matter():
-    text = "# what for\n \t\r\n" * 30_000 + "uint8 n # the number\n\n"
-    fields = fields_of(_channel(text))
-    assert fields is not None
-    assert fields("rig_msgs/Blip") == {"n": "uint8"}
-
-
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("text", _USELESS_IDL.values(), ids=_USELESS_IDL)
 def test_an_idl_that_nests_without_end_leaves_the_type_unknown(text):
     assert begins_with_header(_channel(text, form="ros2idl")) is None
-
-
-def test_a_count_that_lies_is_not_counted_down_on_the_way_to_a_field():
-    text = f"{_HEADER}Pose[] poses\nPose[1000] more\nuint32 n\n{_RULE}MSG: rig_msgs/Pose\nfloat64 x\nfloat64 y\n"
-    read = value_reader(_channel(text), "n")
-    payload = b"\0\1\0\0" + struct.pack("<iIIxxxx", 5, 6, 1)
-    for count in (1, 2**31, 2**32 - 1):
-        assert read(payload + struct.pack("<I", count) + bytes(500)) is None
 
 
 @pytest.mark.parametrize("field", ["number", "label", "header"])

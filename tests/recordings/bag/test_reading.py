@@ -92,14 +92,6 @@ def test_every_kind_of_recording_gives_the_messages_as_they_were_received(kind, 
     assert (frames, faults) == (expected, [])
 
 
-@pytest.mark.parametrize("write", [write_mcap, write_ros1], ids=["mcap", "ros1"])
-def test_messages_that_were_written_out_of_order_come_by_their_receive_time(write, tmp_path):
-    swapped = [frame for pair in zip(FRAMES[1::2], FRAMES[::2], strict=True) for frame in pair]
-    options = {"chunk_size": 500} if write is write_mcap else {}
-    frames, *_ = read(write(tmp_path / "rig", swapped, **options))
-    assert [frame.time for frame in frames] == sorted(frame.time for frame in FRAMES)
-
-
 def test_several_recordings_are_read_as_one(tmp_path):
     camera = write_mcap(tmp_path / "camera.mcap", [frame for frame in FRAMES if frame.topic == "/camera"])
     lidar = write_rosbag2(tmp_path / "lidar", [frame for frame in FRAMES if frame.topic == "/lidar"])
@@ -184,14 +176,6 @@ def test_what_a_killed_recorder_left_in_the_write_ahead_log_is_read(tmp_path):
     database.close()
     frames, faults, _ = read(killed)
     assert (frames[:-1], len(frames), faults) == (FRAMES, len(FRAMES) + 1, [])
-
-
-def test_of_several_files_those_that_cannot_be_read_are_said(tmp_path):
-    folder = _split(lambda into, number, frames: write_mcap(into / f"rig_{number}.mcap", frames))(tmp_path)
-    (folder / "rig_2.mcap").write_bytes(b"")
-    frames, faults, _ = read(folder)
-    assert frames == FRAMES[: len(frames)]
-    assert faults == [f"{folder}/rig_2.mcap: is empty"]
 
 
 def _encrypted() -> bytes:

@@ -10,8 +10,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from syncrelay.config import load_text
-from syncrelay.errors import BagError, UsageError
+from syncrelay.errors import BagError
 from syncrelay.recordings.datasets.lerobot import layout
 from syncrelay.recordings.datasets.lerobot.grid import Grid
 from syncrelay.recordings.datasets.lerobot.sets import INCOMPLETE, NO_IMAGE, NOT_FINITE
@@ -369,9 +368,3 @@ def test_stamps_that_fall_are_no_run_of_time():
         grid.next_set(stamp)
     with pytest.raises(BagError, match=r"stamps of sets fall by 2.5 s after 0.5 s: an episode is one run of time"):
         grid.next_set(3 * NS)
-
-
-def test_a_file_that_says_nothing_of_lerobot_is_told_what_is_missing(tmp_path):
-    loaded = load_text(f"version: 1\ngroups:\n  robot:\n    policy: exact_time\n    topics:{INPUTS}")
-    with pytest.raises(UsageError, match=r"write fps, task and features below `export:` `lerobot:`"):
-        written(tmp_path, drive(tmp_path / "a.mcap"), loaded=loaded)

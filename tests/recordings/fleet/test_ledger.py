@@ -41,13 +41,6 @@ def test_it_keeps_what_was_written(out):
         assert ledger.entries == {ONE.name: replace(ONE, facts={"problems": ["none of it"]}), TWO.name: TWO}
 
 
-def test_the_last_line_of_a_recording_counts(out):
-    with Ledger(out) as ledger:
-        ledger.append(replace(ONE, state=State.REMOVED))
-    with Ledger(out) as ledger:
-        assert {entry.state for entry in ledger.entries.values()} == {State.REMOVED, State.FAILED}
-
-
 def test_a_line_cut_off_anywhere_is_as_good_as_not_written(out):
     whole = (out / LEDGER).read_bytes()
     begin = whole.rstrip(b"\n").rfind(b"\n") + 1

@@ -147,14 +147,6 @@ def test_a_recording_that_cannot_be_reached_keeps_its_result(bags):
     assert set(go(bags).values()) == {Kept()}
 
 
-def test_a_full_disk_is_no_recordings_fault(bags):
-    (bags / "b.mcap").write_text("fill")
-    outcome = go(bags)["b"]
-    assert outcome.ends_all
-    assert "out: cannot be written: No space left on device" in outcome.why
-    assert "b" not in entries(bags.parent / "out")
-
-
 @pytest.mark.parametrize("ignored", [False, True])
 def test_a_recording_that_takes_too_long_is_given_up_alone(ignored, bags):
     (bags / "b.mcap").write_text("hang")
