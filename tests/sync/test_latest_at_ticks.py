@@ -98,6 +98,15 @@ def test_no_tick_comes_twice_when_the_clock_is_corrected_and_all_come_again_when
     for index in range(2):
         group.add(message(index, 10), now=at(20))
     assert [match.tick for match in group.expire(now=at(100))] == [at(50), at(100)]
+    group.pass_over(now=at(-1500))
+    assert group.next_deadline() == at(50)
+
+
+def test_a_simulated_clock_that_begins_at_zero_has_all_its_ticks():
+    group = by_clock()
+    for index in range(2):
+        group.add(Message(index, 1, None), now=1)
+    assert [match.tick for match in group.expire(now=100_000_000)] == [50_000_000, 100_000_000]
 
 
 def test_what_is_let_go_is_all_but_the_latest_of_each_input():
