@@ -41,11 +41,6 @@ def drawn(recent, window=_WINDOW, *, inputs=2, sets=None):
             id="joints lean as the stamps do",
         ),
         pytest.param(
-            [a_set(45, 105), a_set(320, 220)],
-            ["  A             B", "  ╰──╮     ╭────╯", "     A     B", "    60.0 100.0"],
-            id="a wide set has a long joint",
-        ),
-        pytest.param(
             [a_drop(0, 40), a_drop(0, 60, DropReason.LATE), a_drop(1, 80, DropReason.TOO_FAR)],
             ["  »<", "", "    ×", ""],
             id="unmatched messages are marked by their reason",
@@ -64,11 +59,6 @@ def drawn(recent, window=_WINDOW, *, inputs=2, sets=None):
             [a_set(45, None), a_set(None, 145)],
             ["  A", "", "       B", " 0.0  0.0"],
             id="a missing optional message leaves its lane empty and has no joint",
-        ),
-        pytest.param(
-            [a_set(41, 41), a_set(81, 81), a_set(141, 141)],
-            ["  A B  C", "  │ │  │", "  A B  C", " 0.0  0.0"],
-            id="a span that would touch its neighbour is left out",
         ),
         pytest.param([a_set(-1, -20)], ["", "", "", ""], id="what is older than the strip is not on it"),
     ],
