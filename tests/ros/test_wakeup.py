@@ -59,13 +59,3 @@ def test_a_rest_ends_when_it_is_told_to_and_once():
     wakeup.set()
     assert wakeup.wait(600)
     assert not wakeup.wait(0)
-
-
-def test_a_handler_ends_a_long_rest():
-    wakeup = Wakeup()
-    before = signal.signal(signal.SIGALRM, lambda *_: wakeup.set())
-    try:
-        signal.setitimer(signal.ITIMER_REAL, 0.05)
-        assert wakeup.wait(600)
-    finally:
-        signal.signal(signal.SIGALRM, before)
