@@ -91,6 +91,7 @@ class SimulatedSubscription:
     def __init__(self, node: BusNode, message_type: Any, topic: str, profile: Profile) -> None:
         self.topic_name, self.msg_type = topic, message_type
         self.on_data: Callable[[], object] = lambda: None
+        self.is_destroyed = False
         self.reader = node.reader(topic, name_of(message_type), profile, lambda: self.on_data())  # noqa: PLW0108  it may be another then
 
     def lost(self) -> int:
@@ -223,6 +224,7 @@ class SimulatedNode:
             self.publishers.remove(entity)
             entity.writer.end()
         else:
+            entity.is_destroyed = True
             entity.reader.end()
         self.runtime.scheduler.preempt()
 
@@ -401,6 +403,9 @@ class SimulatedWatch:
         return ready, seen_until, woken
 
     def _ready(self) -> list[Any]:
+        # As rclpy's executor: it cannot wait on what has been destroyed.
+        if any(each.subscription.is_destroyed for each in self._sources):
+            raise RclError("Cannot use Destroyable because destruction was requested")
         ready = [each for each in self._sources if each.subscription.reader.queue]
         for each in ready:
             each.pending = ALL
