@@ -2,6 +2,7 @@
 
 import bz2
 import gzip
+import json
 import os
 import random
 import re
@@ -104,9 +105,12 @@ def test_a_folder_may_be_named_by_its_metadata(tmp_path):
 
 def test_a_file_that_the_metadata_names_and_that_is_gone_is_said(tmp_path):
     folder = _ALL_KINDS["MCAP, split"](tmp_path)
-    names = "".join(f"\n  - day/rig_{number}.mcap" for number in range(4))
-    (folder / "metadata.yaml").write_text(f"rosbag2_bagfile_information:\n  relative_file_paths:{names}\n")
-    assert read(folder).faults == ["1 of the 4 files that metadata.yaml names is missing: rig_3.mcap"]
+    named = [*(f"day/rig_{number}.mcap" for number in range(3)), "day/rig_2.db3"]
+    counted = [{"path": path, "message_count": 5} for path in (7, "other.mcap", "rig_2.db3")]
+    about = {"relative_file_paths": named, "files": counted}
+    (folder / "metadata.yaml").write_text(json.dumps({"rosbag2_bagfile_information": about}))
+    (fault,) = read(folder).faults
+    assert fault == "1 of the 4 files that metadata.yaml names is missing, with 5 messages: rig_2.db3"
 
 
 @pytest.mark.parametrize("change", ["never closed", "cut off"])
