@@ -16,33 +16,6 @@ _MORE_OF_FEW = 8
 _HELD_UP = 6
 _LEAST_HELD_UP = 1_000_000
 _SECOND: Final = 1_000_000_000
-BOOT_NS: Final = 365 * 86_400 * _SECOND
-"""No machine runs for longer without a boot, nor has its clock been set before 1971."""
-# For each time scale: how close stamps must be, how far it is behind UTC, and its name. GPS time began in 1980 and has
-# no leap seconds; TAI has 37 more.
-_TIME_SCALES: Final = (
-    (30 * _SECOND, 315_964_800 * _SECOND, "GPS time, which counts from 1980"),
-    (_SECOND // 2, -37 * _SECOND, "TAI, the time of PTP clocks, which is 37 s ahead of UTC"),
-    (_SECOND // 2, -18 * _SECOND, "GPS time, which is 18 s ahead of UTC"),
-)
-_ZONE: Final = 1800 * _SECOND
-_MOST_ZONES: Final = 28
-
-
-def time_scale(newest: int, behind: int) -> tuple[str, int] | None:
-    """Recognize the time scale of stamps that are so far behind others: what they do, and how far that one is behind.
-
-    `newest` is the newest of these stamps.
-    """
-    if 0 < newest < BOOT_NS and behind > BOOT_NS:
-        return "count from boot or the start of a simulation, not from 1970", behind
-    for close, off, what in _TIME_SCALES:
-        if abs(behind - off) < close:
-            return f"look like {what}", off
-    zones, rest = divmod(abs(behind) + _ZONE // 2, _ZONE)
-    if 0 < zones <= _MOST_ZONES and abs(rest - _ZONE // 2) < _SECOND:
-        return "look like local time, not UTC", zones * _ZONE if behind > 0 else -zones * _ZONE
-    return None
 
 
 class Drift(NamedTuple):

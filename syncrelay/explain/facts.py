@@ -15,6 +15,11 @@ from syncrelay.sync.counts import InputCounts
 
 _SECOND: Final = 1_000_000_000
 _NO_SETS: Final = 5 * _SECOND
+NO_SECOND: Final = 10 * _SECOND
+"""For how long a second message may be awaited: slow sensors send every 5 s."""
+# No set for this long, and for so many that should have come, may have a cause that is known already.
+_STOPPED: Final = _SECOND
+_STOPPED_SETS: Final = 5
 # What is found within this time of a group's beginning was there before.
 _FOUND_AT_ONCE: Final = 2 * _SECOND
 
@@ -336,14 +341,37 @@ class GroupFacts:
 
     @property
     def silent_after(self) -> int:
-        """After how long without a set the group is silent: 5 s, or three sets that should have come."""
-        return max(_NO_SETS, round(3 * _SECOND / self.possible_hz)) if self.possible_hz else _NO_SETS
+        """After how long without a set the group is silent: 5 s, or three sets that should have come.
+
+        15 s while an input has sent a single message, which does not tell how often it sends.
+        """
+        if self.possible_hz:
+            return max(_NO_SETS, round(3 * _SECOND / self.possible_hz))
+        is_young = any(
+            each.required and each.figures.rate_hz == 0 and len(each.figures.received) == 1
+            for index, each in enumerate(self.inputs)
+            if not self.is_held(index)
+        )
+        return NO_SECOND + _NO_SETS if is_young else _NO_SETS
 
     @property
     def is_silent(self) -> bool:
         """Whether sets that should have come did not."""
         is_resting = self.asleep or self.pause is not None or self.inactive is not None
         return not is_resting and self.silent_for >= self.silent_after
+
+    @property
+    def has_stopped(self) -> bool:
+        """Whether a few sets in a row that should have come did not. What it takes longer to be sure of is silence."""
+        if self.is_silent:
+            return True
+        required = [each.figures for each in self.inputs if each.required]
+        flows = [each.flows_since for each in required if each.flows_since is not None]
+        is_resting = self.asleep or self.pause is not None or self.inactive is not None
+        if is_resting or len(flows) < len(required) or not self.possible_hz:
+            return False
+        since = max(self.figures.now - self.silent_for, *flows)
+        return self.figures.now - since >= max(_STOPPED, round(_STOPPED_SETS * _SECOND / self.possible_hz))
 
     @property
     def had_time(self) -> bool:

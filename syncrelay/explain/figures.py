@@ -8,6 +8,7 @@ from typing import Final
 
 from syncrelay.explain.clocks import Drift, Step
 from syncrelay.explain.distribution import EMPTY, NOTHING, Distribution, Histogram
+from syncrelay.explain.epochs import Reading
 from syncrelay.explain.standing import NOT_KNOWN, Share
 from syncrelay.sync.messages import DropReason
 
@@ -43,6 +44,8 @@ class InputFigures:
     """Their times of receipt minus their stamps, without stamps of 0."""
     drift: Drift | None = None
     """How its stamps drift against the times of receipt."""
+    reading: Reading | None = None
+    """How its stamps have to be read. None where they run as time does."""
     duplicates: int = 0
     """How many repeated a stamp."""
     out_of_order: int = 0

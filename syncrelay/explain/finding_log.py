@@ -107,7 +107,7 @@ class FindingLog:
                 self._pause, self._log_again = 0, now
         if now < self._log_again:
             return
-        if finding.code in _OF_DRIFT and may_drift(facts):
+        if finding.code in _OF_DRIFT and may_drift(facts) and now - self._log_again < _UNTIL_TRIED:
             # The cause may be known soon.
             return
         if _awaits_a_try(facts, finding) and now - self._log_again < _UNTIL_TRIED:
@@ -135,12 +135,10 @@ class FindingLog:
                 continue
             warning = self._warned.setdefault((finding.code, finding.input), _Warning(finding, now))
             warning.see(finding, now)
-            if finding.code in _OF_DRIFT and may_drift(facts):
-                # The cause may be known soon.
-                warning.began = now
             # One missed set lowers the share for the length of the window.
             missing = facts.figures.share.ns if finding.code is Code.FEW_SETS else 0
-            until_tried = _UNTIL_TRIED if _awaits_a_try(facts, finding) else 0
+            may_be_known = finding.code in _OF_DRIFT and may_drift(facts)
+            until_tried = _UNTIL_TRIED if may_be_known or _awaits_a_try(facts, finding) else 0
             if not warning.is_logged and now - warning.began >= _LASTING + missing + until_tried:
                 warning.is_logged = warning.holds = True
                 yield Remark(Severity.WARN, in_words(finding), (finding,))

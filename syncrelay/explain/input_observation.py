@@ -8,6 +8,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 from syncrelay.explain.clocks import Drift, StampSteps, drift
 from syncrelay.explain.distribution import Distribution, keep_last, no_values
+from syncrelay.explain.epochs import reading
 from syncrelay.explain.figures import InputFigures
 from syncrelay.explain.rhythm import AT_ONCE, LEAST_HELD_NS, Burst, PaceWatch, bursts, steady_period
 from syncrelay.explain.standing import Pace
@@ -176,6 +177,7 @@ class InputObservation:
             stamps=self._stamps[-_LAST_MESSAGES:],
             delays=self._delays[-_LAST_MESSAGES:],
             drift=self._drift,
+            reading=reading(self._stamps, self._delays),
             duplicates=duplicates,
             out_of_order=out_of_order,
             nearest=Distribution(self._nearest[:]),

@@ -119,7 +119,7 @@ EXPLAINS: Final[Mapping[Code, _Explained]] = {
     ),
     Code.CLOCK_STEP: _Explained(MATCHING | {Code.OTHER_CLOCK, Code.CLOCK_DRIFT}, _ORDER | {Code.BURSTS}),
     Code.CLOCK_DRIFT: _Explained(MATCHING | {Code.OTHER_CLOCK}),
-    Code.OTHER_CLOCK: _Explained(MATCHING),
+    Code.OTHER_CLOCK: _Explained(MATCHING, frozenset({Code.DUPLICATES, Code.OUT_OF_ORDER, Code.SLOWED, Code.BURSTS})),
     Code.SLOWED: _Explained(MATCHING),
     Code.BURSTS: _Explained(frozenset({Code.SHORT_QUEUE, Code.FEW_SETS, Code.UNEXPLAINED})),
     Code.MESSAGES_LOST: _Explained(
@@ -180,12 +180,12 @@ class Judge:
                 continue
             if not (may_drift and rule.code in _OF_DRIFT):
                 found += rule.findings(facts)
-            elif facts.is_silent:
+            else:
                 found += [replace(finding, suggestion=_WAIT) for finding in rule.findings(facts)]
         found += self._still_too_wide(found, facts)
         found += [finding for rule in _OTHER_RULES for finding in rule.findings(facts)]
         if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
-            found += [_unexplained(facts)] if facts.had_time else []
+            found += [_unexplained(facts)] if facts.had_time and not rules_matching.is_too_soon(facts) else []
         said = self._unexplained_by_others(found, facts) if found and self._causes else tuple(found)
         for each in said:
             cause = self._causes.get((each.code, each.input))

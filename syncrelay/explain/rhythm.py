@@ -44,6 +44,8 @@ _FEWEST_PACES: Final = 6
 _STEADY: Final = 0.25
 # ... without counting one poll in this many at either end, in which a busy machine held messages up.
 _ODD: Final = 10
+# That it has is seen of so many periods.
+_LATEST: Final = 8
 # It has slowed down below the first share of its steady pace, until it is above the second.
 _SLOWED: Final = 0.7
 RECOVERED: Final = 0.85
@@ -55,6 +57,9 @@ _ABOUT: Final = 0.25
 # ... and hardly any is far longer. Otherwise messages come several at a time.
 _FAR: Final = 4
 _HARDLY: Final = 0.1
+# Of other periods a quarter would be this near to a multiple.
+_WHOLE: Final = 0.125
+_MOSTLY: Final = 0.8
 # Messages closer together than this came at once.
 _LEAST_PERIOD: Final = 1_000_000
 
@@ -72,8 +77,21 @@ def steady_period(received: Sequence[int]) -> float | None:
     far = periods[round((1 - _HARDLY) * (len(periods) - 1))]
     if usual < _LEAST_PERIOD or far > _FAR * usual:
         return None
-    near = periods[bisect_left(periods, (1 - _ABOUT) * usual) : bisect_right(periods, (1 + _ABOUT) * usual)]
-    return sum(near) / len(near) if 2 * len(near) > len(periods) else None
+    near = _about(usual, periods)
+    if 2 * len(near) > len(periods):
+        return sum(near) / len(near)
+    # Where messages are lost at random, most periods are whole multiples of the shortest.
+    near = _about(periods[len(periods) // 4], periods)
+    base = near[len(near) // 2]
+    if base < _LEAST_PERIOD:
+        return None
+    whole = sum(abs(each - round(each / base) * base) <= _WHOLE * base for each in periods if each <= _FAR * base)
+    return sum(near) / len(near) if whole >= _MOSTLY * len(periods) else None
+
+
+def _about(period: int, periods: Sequence[int]) -> Sequence[int]:
+    """Return which periods, sorted, are about as long."""
+    return periods[bisect_left(periods, (1 - _ABOUT) * period) : bisect_right(periods, (1 + _ABOUT) * period)]
 
 
 class PaceWatch:
@@ -98,22 +116,29 @@ class PaceWatch:
             self.now_hz = 0.0
             self.slowed_from = None
             return
-        period = median(map(sub, last[1:], last))
-        self.now_hz = _SECOND / period if period > 0 else 0.0
-        self.slowed_from = self._fell_from()
+        periods = list(map(sub, last[1:], last))
+        self.now_hz = _pace_hz(periods)
+        # A pace that falls is seen of the last few, if hardly any is as short as before: what is lost leaves some so.
+        latest = periods[-_LATEST:]
+        if self.slowed_from is None and (fell := self._fell_from(_pace_hz(latest), min(sorted(latest)[1:]))):
+            self.slowed_from, self.now_hz = fell, _pace_hz(latest)
+        elif self.slowed_from is not None:
+            self.now_hz = _pace_hz(latest)
+            self.slowed_from = self.slowed_from if self.now_hz < RECOVERED * self.slowed_from else None
         if self.now_hz and self.slowed_from is None:
             self._paces.append(self.now_hz)
 
-    def _fell_from(self) -> float | None:
-        if not self.now_hz:
-            return None
-        if self.slowed_from is not None:
-            return self.slowed_from if self.now_hz < RECOVERED * self.slowed_from else None
-        if len(self._paces) < _FEWEST_PACES or self.now_hz >= _SLOWED * max(self._paces):
+    def _fell_from(self, now_hz: float, short: int) -> float | None:
+        if not now_hz or len(self._paces) < _FEWEST_PACES or now_hz >= _SLOWED * max(self._paces):
             return None
         usual = median(self._paces)
         odd = len(self._paces) // _ODD
         steady = sorted(self._paces)[odd : len(self._paces) - odd]
-        if steady[-1] - steady[0] > 2 * _STEADY * usual or self.now_hz >= RECOVERED * steady[0]:
+        if steady[-1] - steady[0] > 2 * _STEADY * usual or now_hz >= RECOVERED * steady[0]:
             return None
-        return usual if self.now_hz < _SLOWED * usual else None
+        return usual if now_hz < _SLOWED * usual and short * usual * _SLOWED > _SECOND else None
+
+
+def _pace_hz(periods: Sequence[int]) -> float:
+    period = median(periods)
+    return _SECOND / period if period > 0 else 0.0

@@ -7,7 +7,7 @@ from syncrelay.config.installed import suspects
 from syncrelay.config.wording import all_of, one_of
 from syncrelay.explain import words
 from syncrelay.explain.codes import Severity
-from syncrelay.explain.facts import Endpoint, GraphSnapshot, GroupFacts, InputFacts, serving
+from syncrelay.explain.facts import NO_SECOND, Endpoint, GraphSnapshot, GroupFacts, InputFacts, serving
 from syncrelay.explain.findings import SECOND, Fault, Found, absence, blocks
 from syncrelay.sync.messages import DropReason
 
@@ -316,14 +316,17 @@ def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Fault | None
 
 def _is_silent(facts: GroupFacts, an_input: InputFacts, quiet: int) -> bool:
     """Whether nothing comes, by this input's rate, or for about as long as no set has left."""
-    usual = an_input.figures.usual_hz
+    figures = an_input.figures
+    if len(figures.received) == 1 and quiet < NO_SECOND and not facts.figures.last_set:
+        return False
+    usual = figures.usual_hz
     if (
         facts.is_silent
         and quiet >= _AS_LONG * facts.silent_for
         and (not usual or quiet * usual > _MISSED_PERIODS * SECOND)
     ):
         return True
-    return quiet >= _NO_MESSAGE and not an_input.figures.rate_hz
+    return quiet >= _NO_MESSAGE and not figures.rate_hz
 
 
 def _is_there(facts: GroupFacts, an_input: InputFacts, quiet: int) -> str:

@@ -24,6 +24,8 @@ from syncrelay.sync.messages import DropReason
 # Sets are too wide if this share of the slowest input's messages has no set, and at least this many were measured.
 _MISSED: Final = 0.05
 _FEWEST: Final = 5
+# Where no set leaves, and none of so few could, that is why.
+_FEWEST_OF_NONE: Final = 3
 # Where messages were held up, wide spans say something about slop only if most are wide.
 _MOST: Final = 0.5
 _MISSING: Final = 0.05
@@ -43,6 +45,11 @@ _OFF: Final = 0.15
 _CONSTANT: Final = 0.05
 _WHOLE: Final = 0.1
 _OTHER_CLOCK: Final = SECOND
+# What is missing was not lost one by one where an input paused for this long, and for so many periods.
+_PAUSE: Final = SECOND
+_PAUSE_PERIODS: Final = 8
+# What fills queues before all inputs have come says nothing of their size.
+_YOUNG: Final = 2 * SECOND
 # The keys that help where a queue overflowed, and where a message came too late for its set.
 _QUEUE: Final = frozenset({"queue_size"})
 _WAITING: Final = frozenset({"queue_size", "max_wait"})
@@ -51,26 +58,30 @@ _WAITING: Final = frozenset({"queue_size", "max_wait"})
 def over_slop(facts: GroupFacts) -> Found:
     """Find that the sets that could be had are too wide for the file."""
     tolerance = facts.tolerance
-    nearest = facts.figures.nearest_since if facts.is_silent else facts.figures.nearest
-    if tolerance is None or len(nearest) < _FEWEST or next(other_clock(facts), None):
+    nearest = facts.figures.nearest_since if facts.has_stopped else facts.figures.nearest
+    if tolerance is None or len(nearest) < (_FEWEST_OF_NONE if facts.has_stopped else _FEWEST):
+        return
+    if next(other_clock(facts), None):
         return
     over = nearest.share_over(tolerance.ns)
-    if not facts.is_silent:
+    if not facts.has_stopped:
         # What was so a while ago, as while an input was away, is no more.
         lately = facts.figures.nearest_lately or nearest
         over = min(over, lately.share_over(tolerance.ns))
     came_at_once = any(each.required and each.figures.bursts for each in facts.inputs)
-    if facts.is_silent and over > 1 - _MISSED:
-        text, severity = _too_wide(facts, tolerance, nearest), Severity.ERROR
+    if facts.has_stopped and over > 1 - _MISSED:
+        severity = Severity.ERROR if facts.is_silent else Severity.WARN
+        text = _too_wide(facts, tolerance, nearest)
     # What was held up may only seem far apart, and a wider slop would pair what came together. One message is chance.
-    elif not facts.is_silent and over > max(_MOST if came_at_once else _MISSED, 1.5 / len(nearest)):
+    elif not facts.has_stopped and over > max(_MOST if came_at_once else _MISSED, 1.5 / len(nearest)):
         text, severity = _often_too_wide(facts, tolerance, nearest), Severity.WARN
     else:
         return
     found = _verdict(facts, (Code.OVER_SLOP, None), lambda trials: _wide_enough(facts, tolerance, nearest, trials))
-    yield Fault(
-        text, _advice(facts, found) or "check how these topics are stamped, and whether messages are missing", severity
-    )
+    check = "check how these topics are stamped, and whether messages are missing"
+    if len(nearest) < _FEWEST:
+        check = "wait for some more messages: it is not known yet what would help"
+    yield Fault(text, _advice(facts, found) or check, severity)
 
 
 def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
@@ -161,7 +172,8 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find messages that overflowed and then were missed."""
     needed = an_input.counts.needed_queue
     overflowed = an_input.figures.dropped.get(DropReason.OVERFLOW, 0)
-    if needed is None or not overflowed or needed <= facts.queue_size:
+    is_young = facts.figures.now - facts.figures.began < _YOUNG
+    if needed is None or not overflowed or needed <= facts.queue_size or is_young:
         return
     missed_hz = facts.possible_hz - facts.figures.rate_hz
     # A set that leaves a little later than the window ends was not missed.
@@ -278,17 +290,27 @@ def few_sets(facts: GroupFacts) -> Found:
         return
     share = facts.figures.share
     pacemaker = facts.pacemaker if share.pacemaker is None else facts.inputs[share.pacemaker]
+    pause = pacemaker.figures.longest_pause
     severity = Severity.ERROR if facts.standing is Standing.NONE else Severity.WARN
     left = left_of_possible(facts)
     if 2 * share.absent > share.possible - share.left:
+        is_pause = pause >= _PAUSE and pause * pacemaker.figures.usual_hz > _PAUSE_PERIODS * SECOND
+        why = f"it paused for up to {words.duration(pause)}" if is_pause else "they are lost, or it leaves some out"
         yield Fault(
-            f"{left}; {share.absent} messages of {pacemaker.name} did not come: it pauses, or they are lost",
+            f"{left}; {share.absent} of {share.possible} messages of {pacemaker.name} did not come: {why}",
             f"check {nodes(pacemaker)}, and the network to it",
             severity,
             input=share.pacemaker,
         )
         return
     yield Fault(f"{left}; {fates(pacemaker)}", more_sets(facts, Code.FEW_SETS), severity)
+
+
+def is_too_soon(facts: GroupFacts) -> bool:
+    """Whether too few messages of slow inputs have come to say how far apart they are."""
+    measured = sum(each.required and each.own_tolerance is None for each in facts.inputs) > 1
+    few = len(facts.figures.nearest_since) < _FEWEST_OF_NONE
+    return measured and facts.tolerance is not None and few and facts.silent_for * facts.possible_hz < _FEWEST * SECOND
 
 
 def left_of_possible(facts: GroupFacts) -> str:

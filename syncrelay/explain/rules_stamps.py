@@ -6,11 +6,13 @@ from typing import Final
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
 from syncrelay.explain.changes import offset_change
-from syncrelay.explain.clocks import BOOT_NS, Drift, apart, time_scale
+from syncrelay.explain.clocks import Drift, apart
 from syncrelay.explain.codes import Code, Severity
+from syncrelay.explain.epochs import BOOT_NS, time_scale
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Fault, Found, blocks, counted, nodes
 from syncrelay.explain.rules_flow import waited_for_relay
+from syncrelay.explain.standing import Standing
 from syncrelay.explain.trials import REQUIRED, Trials, Verdict
 from syncrelay.sync.messages import DropReason
 
@@ -38,7 +40,7 @@ _EVIDENT: Final = 5
 _EVIDENT_OF_FEW: Final = 240
 _MAY_BE: Final = 2
 _USUAL: Final = 0.95
-# Wait this long for proof of a drift; in a silence only the second time, unless the stamps look like a drift.
+# Wait this long for proof of a drift; the second time only, from when sets are missing, unless stamps look like one.
 _DRIFT_PROVEN: Final = 60 * SECOND
 _DRIFT_PROVEN_SILENT: Final = 15 * SECOND
 # Of two inputs, one with less than this share of the other's drift has the better clock.
@@ -48,6 +50,8 @@ _MATTERS: Final = 0.5
 _STEPPED_ALIKE: Final = SECOND // 2
 # Two ways to measure one offset agree within this share of it.
 _SAME_OFFSET: Final = 0.1
+# Stamps of inputs that run this much alike are of one clock.
+_SAME_RATE: Final = 0.05
 _SLEW: Final = "check what set the clock {where}; NTP and chrony can be told to slew it instead"
 
 
@@ -93,11 +97,18 @@ def _blocks_if_most(facts: GroupFacts, an_input: InputFacts, count: int) -> Seve
 
 
 def other_clock(facts: GroupFacts) -> Found:
-    """Find an input whose stamps, against the time of their receipt, are far off those of the others."""
-    if not facts.by_stamp or facts.ticks_hz is not None or not facts.is_silent or facts.is_new:
+    """Find an input whose stamps, against the time of their receipt, are of another unit, rate or time."""
+    if not facts.by_stamp or facts.is_new:
         return
+    misread = list(_misread(facts))
+    yield from misread
+    if misread or facts.ticks_hz is not None or not facts.has_stopped:
+        return
+    # Two messages show whether their stamps run as time does.
     delays = {
-        index: each.figures.delay for index, each in enumerate(facts.inputs) if each.required and each.figures.rate_hz
+        index: each.figures.delay
+        for index, each in enumerate(facts.inputs)
+        if each.required and (each.figures.rate_hz or len(each.figures.received) == 1) and len(each.figures.delays) > 1
     }
     known = {index: delay - facts.inputs[index].offset for index, delay in delays.items() if delay is not None}
     if len(known) < 2:  # noqa: PLR2004  one alone has no other clock
@@ -127,7 +138,34 @@ def other_clock(facts: GroupFacts) -> Found:
             f"synchronize the clocks of their machines{_or_offset(facts, odd, behind + offset)}"
             f"{_wait_for_it(facts, odd, behind)}"
         )
-    yield Fault(text, suggestion, Severity.ERROR, input=odd)
+    yield Fault(text, suggestion, blocks(facts, an_input), input=odd)
+
+
+def _misread(facts: GroupFacts) -> Found:
+    """Find inputs whose stamps do not run as time does; none where all run alike, as those of a player do."""
+    readings = {index: each.figures.reading for index, each in enumerate(facts.inputs) if each.figures.stamps}
+    rates = [each.rate for each in readings.values() if each is not None and not each.is_unit]
+    if 1 < len(rates) == len(readings) and max(rates) - min(rates) <= _SAME_RATE * min(rates):
+        return
+    for index, reading in readings.items():
+        an_input = facts.inputs[index]
+        if reading is None:
+            continue
+        # Delays that grow look like another rate, but then they grow little, and cost few sets.
+        is_sure = reading.is_unit or reading.strayed > _OTHER_CLOCK
+        if not (is_sure or facts.has_stopped or facts.standing is not Standing.ENOUGH):
+            continue
+        check = (
+            "writes whole seconds into sec and the rest, in nanoseconds, into nanosec"
+            if reading.is_unit
+            else "stamps with the host's time, not with simulated time or a counter of its own"
+        )
+        yield Fault(
+            f"stamps of {an_input.name} {reading.what}",
+            f"check that {nodes(an_input)} {check}{_or_by_arrival(facts, an_input)}",
+            blocks(facts, an_input),
+            input=index,
+        )
 
 
 def offered_offset(facts: GroupFacts, code: Code, index: int, by: int) -> str:
@@ -218,7 +256,12 @@ def clock_step(facts: GroupFacts) -> Found:
         return
     if not facts.by_stamp:
         return
-    stepped = [(index, each.figures.stepped) for index, each in enumerate(facts.inputs) if each.figures.stepped]
+    # What does not run as time does steps all the time.
+    stepped = [
+        (index, each.figures.stepped)
+        for index, each in enumerate(facts.inputs)
+        if each.figures.stepped and each.figures.reading is None
+    ]
     steps = [step.by for _, step in stepped if step]
     if 1 < len(steps) == len(facts.inputs) and max(steps) - min(steps) < _STEPPED_ALIKE:
         at = max(step.at for _, step in stepped if step)
@@ -255,6 +298,8 @@ def _ago(now: int, at: int) -> str:
 def time_jump(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find that stamps fell back; without blame, unless they do so again and again."""
     now, figures = facts.figures.now, an_input.figures
+    if figures.reading is not None:
+        return
     if facts.by_stamp and figures.swings >= _FEWEST_SWINGS:
         yield Fault(
             f"timestamps of {an_input.name} jump back and forth by {words.duration(figures.swung_by)}",
@@ -289,7 +334,12 @@ def duplicates(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
 
 def _drifts(facts: GroupFacts) -> tuple[dict[int, Drift], dict[int, Drift]]:
     """Return the drifts of the inputs of which they are known, and how they drift away from the others' median."""
-    known = {index: each.figures.drift for index, each in enumerate(facts.inputs) if each.figures.drift}
+    # What no crystal is off by is another rate.
+    known = {
+        index: each.figures.drift
+        for index, each in enumerate(facts.inputs)
+        if each.figures.drift and each.figures.reading is None
+    }
     if not facts.by_stamp or len(known) < 2:  # noqa: PLR2004  one alone cannot drift apart
         return {}, {}
     return known, {
@@ -314,7 +364,7 @@ def may_drift(facts: GroupFacts) -> bool:
     if facts.by_stamp and any(facts.figures.now - since < _DRIFT_SOON for since in young):
         return True
     needed = max(_MATTERS * tolerance.ns, nearest.quantile(_USUAL) - tolerance.ns) / watched
-    is_urgent = facts.is_silent and facts.silent_for >= _DRIFT_PROVEN_SILENT
+    is_urgent = (facts.silent_for if facts.is_silent else watched) >= _DRIFT_PROVEN_SILENT
     return any(
         abs(each.slope) >= max(needed, _MAY_BE * each.error)
         or (not is_urgent and abs(each.slope) + _MAY_BE * each.error >= needed)

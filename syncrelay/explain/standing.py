@@ -15,6 +15,8 @@ SHARE_WINDOW_NS: Final = 10 * _SECOND
 _LONGEST: Final = 600 * _SECOND
 # With fewer possible sets than this there is no share. A window that holds the second number is long enough.
 _FEWEST: Final = 10
+# At 100 Hz ten sets are a tenth of a second, in which inputs that begin one after the other miss some.
+_LEAST_NS: Final = 2_500_000_000
 _ENOUGH_TO_TELL: Final = 30
 # Below this share a group gives too few sets, until the share is above the other bound.
 _FEW: Final = 0.8
@@ -54,7 +56,7 @@ class Share:
 
     The required input with the fewest messages, received or expected, limits what is `possible`. It is the `pacemaker`;
     None if a clock makes the sets. `absent` counts its messages that should have come, at its usual pace, and did not.
-    `is_pausing` is set while they still do not come.
+    `is_pausing` is set while those of any input still do not come.
     """
 
     left: int = 0
@@ -66,8 +68,9 @@ class Share:
 
     @property
     def value(self) -> float | None:
-        """From 0 to 1; None while fewer than 10 sets were possible."""
-        return min(1.0, self.left / self.possible) if self.possible >= _FEWEST else None
+        """From 0 to 1; None while fewer than 10 sets were possible, or not for long enough."""
+        is_known = self.possible >= _FEWEST and self.ns >= _LEAST_NS
+        return min(1.0, self.left / self.possible) if is_known else None
 
 
 NOT_KNOWN: Final = Share()
@@ -183,7 +186,8 @@ class ShareWindow:
             return Share(left, self._thinned(int(elapsed * self._ticks_hz / _SECOND / self._every), elapsed), ns)
         due = [(*self._due(place, first, last), index) for place, index in enumerate(self._counted)]
         possible, absent, pacemaker = min(due)
-        return Share(left, self._thinned(possible, ns), ns, pacemaker, absent, is_pausing=self._is_pausing[pacemaker])
+        is_pausing = any(self._is_pausing.values())
+        return Share(left, self._thinned(possible, ns), ns, pacemaker, absent, is_pausing=is_pausing)
 
     def _thinned(self, possible: int, ns: int) -> int:
         return min(possible, ns // self._least_period) if self._least_period else possible

@@ -18,8 +18,8 @@ from syncrelay.config import Distance, GroupConfig
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
 from syncrelay.explain.changes import Change, Changes, changed, offset_change
-from syncrelay.explain.clocks import time_scale
 from syncrelay.explain.dry_run import EngineDriver
+from syncrelay.explain.epochs import time_scale
 from syncrelay.explain.nearest import (
     LONGEST,
     Nanoseconds,

@@ -122,9 +122,10 @@ def drawn(seed: int, kinds: Sequence[str], n_faults: int) -> Drawn:
 
 
 def _faulty(chance: random.Random, kinds: list[Kind]) -> tuple[Rig, tuple[Truth, ...]]:
-    policy = chance.choice(
-        [each for each in kinds[0].policies if all(each in of.policies for of in kinds)] or ["approximate_time"]
-    )
+    policies = [each for each in kinds[0].policies if all(each in of.policies for of in kinds)]
+    if not policies:
+        return a_rig(chance, "approximate_time"), ()
+    policy = chance.choice(policies)
     rig = a_rig(chance, policy, same_rate=any(each.same_rate for each in kinds))
     truths = []
     for kind in kinds:

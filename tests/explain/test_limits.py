@@ -25,7 +25,8 @@ from syncrelay.explain import (
     words,
 )
 from syncrelay.explain.cause_log import CauseLog
-from syncrelay.explain.clocks import Drift, Step, time_scale
+from syncrelay.explain.clocks import Drift, Step
+from syncrelay.explain.epochs import time_scale
 from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.input_observation import InputObservation
 from syncrelay.explain.rhythm import PaceWatch, bursts, steady_period
@@ -320,7 +321,7 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "fell in the input": (0, 9 * S, S + 1, fell_by),
     # How stamps match.
     "over slop": (0, 60 * MS, 20 * MS + 1, lambda by: told(wide(*[by] * 9), Code.OVER_SLOP)),
-    "enough to tell": (0, 9, 5, lambda n: told(wide(*[60 * MS] * n), Code.OVER_SLOP)),
+    "enough to tell": (0, 9, 3, lambda n: told(wide(*[60 * MS] * n), Code.OVER_SLOP)),
     "all over slop": (0, 100, 96, lambda n: told(wide(*[60 * MS] * n, *[MS] * (100 - n)), Code.OVER_SLOP)),
     "some over slop": (0, 100, 6, lambda n: told(a_group(figures=spans(n, 100)), Code.OVER_SLOP)),
     "more than chance": (0, 20, 2, lambda n: told(a_group(figures=spans(n, 20)), Code.OVER_SLOP)),
@@ -348,7 +349,7 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "few": (100, 0, 79, lambda n: stands(n) is Standing.FEW),
     "enough again": (0, 100, 95, lambda n: stands(n, Standing.FEW) is Standing.ENOUGH),
     "not none any more": (0, 94, 50, lambda n: stands(n, Standing.NONE) is Standing.FEW),
-    "possible sets to tell": (0, 99, 10, lambda n: Share(0, n).value is not None),
+    "possible sets to tell": (0, 99, 10, lambda n: Share(0, n, 10 * S).value is not None),
     # The log.
     "a warning lasts": (0, 60 * S, 5 * S, lambda by: warns(0, by) == [by]),
     "a warning is news": (6 * S, 99 * S, 71 * S + 1, lambda by: len(warns(0, 5 * S, 11 * S, by, by + 5 * S)) == 2),
@@ -371,7 +372,7 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "rate of a window": (0, 9, 5, lambda n: rates(20, n)[0] == 2 * n),
     "rate of messages": (0, 9, 5, lambda n: rates(n, n)[1] > 0),
     "periods to tell": (0, 40, 20, lambda n: is_steady(*[10 * MS] * n)),
-    "about as long": (0, 10 * MS, 7_500_000, lambda by: is_steady(*[by] * 8, *[10 * MS] * 15, *[20 * MS] * 8)),
+    "about as long": (0, 10 * MS, 7_500_000, lambda by: is_steady(*[by] * 8, *[10 * MS] * 15, *[25 * MS] * 8)),
     "no longer": (20 * MS, 10 * MS, 12_500_000, lambda by: is_steady(*[MS] * 8, *[10 * MS] * 15, *[by] * 8)),
     "most about as long": (10, 20, 11, lambda n: is_steady(*[10 * MS] * n, *[25 * MS] * (20 - n))),
     "hardly any longer": (0, 9, 3, lambda n: not is_steady(*[10 * MS] * (21 - n), *[99 * MS] * n)),

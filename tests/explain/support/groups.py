@@ -36,7 +36,7 @@ def _input_figures(*, last_received=NOW - 50 * MS, longest_pause=101 * MS, delay
         fed=100,
         flows_since=BEGAN,
         received=() if last_received is None else (last_received - longest_pause, last_received),
-        delays=() if delay is None else (delay,),
+        delays=() if delay is None else (delay, delay),
     )
     return replace(usual, **others)
 

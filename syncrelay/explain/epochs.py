@@ -1,0 +1,169 @@
+"""Which time stamps are of: their unit, how fast it passes and from when it counts, told by values and slope.
+
+One table of hypotheses is tried on the stamps against the times of receipt. The right one leaves delays that hardly
+change; a wrong one leaves a saw-tooth or a slope that no clock has.
+"""
+
+from collections.abc import Callable, Sequence
+from statistics import median
+from typing import Final, NamedTuple
+
+_SECOND: Final = 1_000_000_000
+BOOT_NS: Final = 365 * 86_400 * _SECOND
+"""No machine runs for longer without a boot, nor has its clock been set before 1971."""
+MOST_DRIFT: Final = 2e-3
+"""Crystals are within some 100 ppm, bad ones within 1,000: what is off by more than this does not drift."""
+# For each time scale: how close stamps must be, how far it is behind UTC, and its name. GPS time began in 1980 and has
+# no leap seconds; TAI has 37 more.
+_TIME_SCALES: Final = (
+    (30 * _SECOND, 315_964_800 * _SECOND, "GPS time, which counts from 1980"),
+    (_SECOND // 2, -37 * _SECOND, "TAI, the time of PTP clocks, which is 37 s ahead of UTC"),
+    (_SECOND // 2, -18 * _SECOND, "GPS time, which is 18 s ahead of UTC"),
+)
+_ZONE: Final = 1800 * _SECOND
+_MOST_ZONES: Final = 28
+_FROM_BOOT: Final = "count from boot or the start of a simulation, not from 1970"
+# The newest messages are read: those of this long, but no fewer than the first number, and of them about the second.
+# Two show a unit, as no clock runs 1,000 times too fast; any other rate takes more.
+_LATELY: Final = 10 * _SECOND
+_FEWEST: Final = 5
+_ENOUGH: Final = 40
+_SHOW_A_UNIT: Final = 2
+# A reading is better than none if delays scatter by at most this share of what they did, and did so by more than this,
+# over at least this time: less may be jitter, or a load that grows.
+_BETTER: Final = 0.2
+_LEAST_SCATTER: Final = 20_000_000
+_WATCHED: Final = _SECOND
+# The delays between these quantiles: a pause or a message that was held up says nothing of a clock.
+_MIDDLE: Final = (0.1, 0.9)
+# A slope that is this close to a power of 1,000 is one of a wrong unit.
+_CLOSE: Final = 0.05
+
+
+class Reading(NamedTuple):
+    """How stamps have to be read: what they do, in words, and how many times as fast as this machine's time they run.
+
+    `is_unit` says that the unit is wrong, and not the clock, and `strayed` by how much their delays changed.
+    """
+
+    what: str
+    rate: float = 1.0
+    is_unit: bool = False
+    strayed: int = 0
+
+
+class _Unit(NamedTuple):
+    rate: float
+    what: str
+
+
+_UNITS: Final = (
+    _Unit(1e-3, "are microseconds that were read as nanoseconds"),
+    _Unit(1e-6, "are milliseconds that were read as nanoseconds"),
+    _Unit(1e3, "hold milliseconds in the field sec"),
+    _Unit(1e6, "hold microseconds in the field sec"),
+)
+
+
+class _Part(NamedTuple):
+    """A unit of the field nanosec: how many nanoseconds it has, and where the stamps of a second then lie."""
+
+    nanoseconds: int
+    what: str
+
+
+_PARTS: Final = (
+    _Part(1_000_000, "lie in the first microsecond of each second: their field nanosec holds milliseconds"),
+    _Part(1_000, "lie in the first millisecond of each second: their field nanosec holds microseconds"),
+)
+
+
+def time_scale(newest: int, behind: int) -> tuple[str, int] | None:
+    """Recognize the time scale of stamps that are so far behind others: what they do, and how far that one is behind.
+
+    `newest` is the newest of these stamps.
+    """
+    if 0 < newest < BOOT_NS and behind > BOOT_NS:
+        return _FROM_BOOT, behind
+    for close, off, what in _TIME_SCALES:
+        if abs(behind - off) < close:
+            return f"look like {what}", off
+    zones, rest = divmod(abs(behind) + _ZONE // 2, _ZONE)
+    if 0 < zones <= _MOST_ZONES and abs(rest - _ZONE // 2) < _SECOND:
+        return "look like local time, not UTC", zones * _ZONE if behind > 0 else -zones * _ZONE
+    return None
+
+
+def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
+    """Return how stamps have to be read, from them and their delays; None where they run as time does.
+
+    All are in nanoseconds, in the order of receipt.
+    """
+    last = _newest(stamps, delays)
+    if len(last) < _SHOW_A_UNIT or last[-1][1] - last[0][1] < _WATCHED:
+        return None
+    scatter = _scatter(last, lambda stamp: stamp)
+    if scatter < _LEAST_SCATTER:
+        return None
+    return _of_parts(last, scatter) or _of_rate(last, scatter)
+
+
+def _of_parts(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:
+    """Return a reading by which the field nanosec is of another unit."""
+    for part in _PARTS if len(last) >= _FEWEST else ():
+        if all(stamp % _SECOND < _SECOND // part.nanoseconds for stamp, _ in last):
+            whole = _scatter(last, lambda stamp, part=part: _spread_out(stamp, part))  # type: ignore[misc]
+            if whole <= _BETTER * scatter:
+                return Reading(part.what, is_unit=True, strayed=scatter)
+    return None
+
+
+def _of_rate(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:
+    """Return a reading by which stamps run faster or slower than time."""
+    rate, first = _rate(last), last[0][0]
+    if rate <= 0 or abs(rate - 1) <= MOST_DRIFT:
+        return None
+    if _scatter(last, lambda stamp: round((stamp - first) / rate)) > _BETTER * scatter:
+        return None
+    for unit in _UNITS:
+        if abs(rate / unit.rate - 1) < _CLOSE:
+            return Reading(unit.what, unit.rate, is_unit=True, strayed=scatter)
+    if len(last) < _FEWEST:
+        return None
+    runs = f"run at {rate:.3g} times the speed of this machine's time"
+    return Reading(f"{_FROM_BOOT}, and {runs}" if 0 <= last[-1][0] < BOOT_NS else runs, rate, strayed=scatter)
+
+
+def _newest(stamps: Sequence[int], delays: Sequence[int]) -> list[tuple[int, int]]:
+    """Return stamps and times of receipt of some of the newest messages."""
+    count = min(len(stamps), len(delays))
+    if not count:
+        return []
+    end = stamps[-1] + delays[-1]
+    first = max(0, count - _FEWEST)
+    step = max(1, count // _ENOUGH)
+    while first > 0 and end - (stamps[first - 1] + delays[first - 1]) <= _LATELY:
+        first = max(0, first - step)
+    step = max(1, (count - first) // _ENOUGH)
+    return [(stamps[at], stamps[at] + delays[at]) for at in range(count - 1, first - 1, -step)][::-1]
+
+
+def _scatter(pairs: Sequence[tuple[int, int]], read: Callable[[int], int]) -> int:
+    delays = sorted(received - read(stamp) for stamp, received in pairs)
+    low, high = (delays[round(share * (len(delays) - 1))] for share in _MIDDLE)
+    return high - low
+
+
+def _spread_out(stamp: int, part: _Part) -> int:
+    return stamp // _SECOND * _SECOND + stamp % _SECOND * part.nanoseconds
+
+
+def _rate(pairs: Sequence[tuple[int, int]]) -> float:
+    """Return how many times as fast as the times of receipt stamps run: the median over pairs half of all apart."""
+    half = len(pairs) // 2
+    slopes = [
+        (after[0] - before[0]) / (after[1] - before[1])
+        for before, after in zip(pairs, pairs[half:], strict=False)
+        if after[1] > before[1]
+    ]
+    return median(slopes) if slopes else 0.0
