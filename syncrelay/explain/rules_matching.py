@@ -47,7 +47,7 @@ _WHOLE: Final = 0.1
 _OTHER_CLOCK: Final = SECOND
 # What is missing was not lost one by one where an input paused for this long, and for so many periods.
 _PAUSE: Final = SECOND
-_PAUSE_PERIODS: Final = 8
+_PAUSE_PERIODS: Final = 5
 # What fills queues before all inputs have come says nothing of their size.
 _YOUNG: Final = 2 * SECOND
 # The keys that help where a queue overflowed, and where a message came too late for its set.
@@ -294,7 +294,7 @@ def few_sets(facts: GroupFacts) -> Found:
     severity = Severity.ERROR if facts.standing is Standing.NONE else Severity.WARN
     left = left_of_possible(facts)
     if 2 * share.absent > share.possible - share.left:
-        is_pause = pause >= _PAUSE and pause * pacemaker.figures.usual_hz > _PAUSE_PERIODS * SECOND
+        is_pause = pause >= _PAUSE and pause * pacemaker.figures.pace_hz > _PAUSE_PERIODS * SECOND
         why = f"it paused for up to {words.duration(pause)}" if is_pause else "they are lost, or it leaves some out"
         yield Fault(
             f"{left}; {share.absent} of {share.possible} messages of {pacemaker.name} did not come: {why}",

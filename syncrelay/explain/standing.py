@@ -185,7 +185,10 @@ class ShareWindow:
             elapsed = last.clock - first.clock
             return Share(left, self._thinned(int(elapsed * self._ticks_hz / _SECOND / self._every), elapsed), ns)
         due = [(*self._due(place, first, last), index) for place, index in enumerate(self._counted)]
-        possible, absent, pacemaker = min(due)
+        possible = min(due)[0]
+        # Of those that limit it about alike, the one whose messages are absent is why.
+        alike = (each for each in due if each[0] <= 1 + (1 + _UNSURE) * possible)
+        _, absent, pacemaker = max(alike, key=lambda each: (each[1], -each[0]))
         is_pausing = any(self._is_pausing.values())
         return Share(left, self._thinned(possible, ns), ns, pacemaker, absent, is_pausing=is_pausing)
 

@@ -175,7 +175,10 @@ def play(draw: Drawn) -> Result:
         result.first = result.first or (second, shown)
         if draw.truths and not _is_open(facts, shown):
             result.first = second, shown
-            raise _HeardEnoughError
+            # What has only just begun may be less than it will be.
+            fits = [_fit(draw, truth, second, shown) for truth in draw.truths if second < truth.seen]
+            if (Score.HALF, "size") not in fits:
+                raise _HeardEnoughError
 
     with contextlib.suppress(_HeardEnoughError):
         run(
@@ -233,7 +236,9 @@ def _fit(draw: Drawn, truth: Truth, second: float, finding: Finding) -> tuple[Sc
         return Score.OTHER, finding.code.value
     about = {topics[index] for index in finding.about} or set(re.findall(r"/\w+", _sentence(finding)))
     text = _sentence(finding)
-    if truth.topics and not about & truth.topics:
+    # Of two inputs that do not fit, neither is the one.
+    is_pair = not about and len(topics) == 2 and finding.code is Code.OVER_SLOP
+    if truth.topics and not about & truth.topics and not is_pair:
         return Score.HALF, "input"
     if truth.sizes and not any(_is_near(each, size) for each in _figures(text, truth.unit) for size in truth.sizes):
         return Score.HALF, "size"
