@@ -89,7 +89,9 @@ def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distributi
     name = facts.pacemaker.name
     if tolerance.wider_policy:
         return f"{missed} {name} have no partner with an equal stamp"
-    return f"{missed} {name} were farther from their partners than {tolerance.key} {words.duration(tolerance.ns)}"
+    limit = f"{tolerance.key} {words.duration(tolerance.ns)}"
+    most = words.duration(nearest.quantile(0.95))
+    return f"{missed} {name} were farther from their partners than {limit}: up to {most}"
 
 
 def _too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
@@ -231,7 +233,7 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
         found = _verdict(facts, about, lambda trials: _in_time(index, trials))
         side = "behind" if behind > 0 else "ahead of"
         return (
-            f": its stamps are {words.duration(abs(behind))} {side} those of the others",
+            f": its stamps are {words.span_of_time(abs(behind))} {side} those of the others",
             f"synchronize their clocks{_or(_advice(facts, found, name))}",
         )
     if nearest.quantile(0.5) > tolerance.ns:

@@ -232,7 +232,7 @@ def several_publishers(facts: GroupFacts, index: int, an_input: InputFacts) -> F
     disorder = figures.out_of_order + (0 if facts.is_held(index) else figures.duplicates) if facts.by_stamp else 0
     # Whatever messages are matched by, it begins anew when stamps fall.
     if figures.swings >= _FEWEST_SWINGS:
-        conflict = f"their stamps are {words.duration(figures.swung_by)} apart"
+        conflict = f"their stamps are {words.span_of_time(figures.swung_by)} apart"
     elif disorder > _FAULTY * figures.fed:
         conflict = f"{counted(disorder, figures.fed)} messages repeat a stamp or arrived out of stamp order"
     else:
@@ -288,7 +288,7 @@ def _of_others(facts: GroupFacts, index: int, at: int) -> str:
 
 
 def _forward(by: int) -> str:
-    return f"{'forward' if by > 0 else 'back'} by {words.duration(abs(by))}"
+    return f"{'forward' if by > 0 else 'back'} by {words.span_of_time(abs(by))}"
 
 
 def _ago(now: int, at: int) -> str:
@@ -302,13 +302,13 @@ def time_jump(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
         return
     if facts.by_stamp and figures.swings >= _FEWEST_SWINGS:
         yield Fault(
-            f"timestamps of {an_input.name} jump back and forth by {words.duration(figures.swung_by)}",
+            f"timestamps of {an_input.name} jump back and forth by {words.span_of_time(figures.swung_by)}",
             f"check whether {nodes(an_input)} stamps by two clocks, or two nodes publish {an_input.name}",
             blocks(facts, an_input),
         )
     elif figures.fell_at is not None and figures.fell_by is not None and now - figures.fell_at < _TOLD_JUMP:
         yield Fault(
-            f"timestamps of {an_input.name} jumped back {words.duration(figures.fell_by)},"
+            f"timestamps of {an_input.name} jumped back {words.span_of_time(figures.fell_by)},"
             f" {_ago(now, figures.fell_at)}; matching restarted",
             "a looped recording does this, or a clock that was reset",
             Severity.OK,
