@@ -36,6 +36,7 @@ _LEAST_SCATTER: Final = 20_000_000
 _WATCHED: Final = _SECOND
 # The delays between these quantiles: a pause or a message that was held up says nothing of a clock.
 _MIDDLE: Final = (0.1, 0.9)
+_RESOLUTIONS: Final = (_SECOND, _SECOND // 10, _SECOND // 100)
 # A slope that is this close to a power of 1,000 is one of a wrong unit.
 _CLOSE: Final = 0.05
 
@@ -106,6 +107,14 @@ def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
     if scatter < _LEAST_SCATTER:
         return None
     return _of_parts(last, scatter) or _of_rate(last, scatter)
+
+
+def resolution(stamps: Sequence[int]) -> int:
+    """Return of which unit all the last stamps are multiples, in nanoseconds: 1 s, 100 or 10 ms; 0 of none of these."""
+    last = stamps[-_ENOUGH:]
+    if len(last) < _FEWEST:
+        return 0
+    return next((unit for unit in _RESOLUTIONS if not any(stamp % unit for stamp in last)), 0)
 
 
 def _of_parts(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:

@@ -46,6 +46,8 @@ class InputFigures:
     """How its stamps drift against the times of receipt."""
     reading: Reading | None = None
     """How its stamps have to be read. None where they run as time does."""
+    resolution: int = 0
+    """Of which unit all its stamps are multiples: 1 s, 100 or 10 ms. 0 of none of these."""
     duplicates: int = 0
     """How many repeated a stamp."""
     out_of_order: int = 0

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 from syncrelay.explain.clocks import Drift, StampSteps, drift
 from syncrelay.explain.distribution import Distribution, keep_last, no_values
-from syncrelay.explain.epochs import reading
+from syncrelay.explain.epochs import reading, resolution
 from syncrelay.explain.figures import InputFigures
 from syncrelay.explain.rhythm import AT_ONCE, LEAST_HELD_NS, Burst, PaceWatch, bursts, steady_period
 from syncrelay.explain.standing import Pace
@@ -178,6 +178,7 @@ class InputObservation:
             delays=self._delays[-_LAST_MESSAGES:],
             drift=self._drift,
             reading=reading(self._stamps, self._delays),
+            resolution=resolution(self._stamps),
             duplicates=duplicates,
             out_of_order=out_of_order,
             nearest=Distribution(self._nearest[:]),

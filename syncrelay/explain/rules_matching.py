@@ -8,6 +8,7 @@ import numpy as np
 
 from syncrelay.config import Distance, Tolerance
 from syncrelay.config.units import parse_duration
+from syncrelay.config.wording import all_of
 from syncrelay.explain import words
 from syncrelay.explain.changes import Changes
 from syncrelay.explain.codes import Code, Severity
@@ -81,6 +82,10 @@ def over_slop(facts: GroupFacts) -> Found:
     check = "check how these topics are stamped, and whether messages are missing"
     if len(nearest) < _FEWEST:
         check = "wait for some more messages: it is not known yet what would help"
+    coarse = {each.name: unit for each in facts.inputs if (unit := each.figures.resolution) > tolerance.ns}
+    if 0 < len(coarse) < len(facts.inputs):
+        text += "".join(f"; stamps of {name} are multiples of {words.duration(unit)}" for name, unit in coarse.items())
+        check = f"check whether {all_of(coarse)} rounds its stamps"
     yield Fault(text, _advice(facts, found) or check, severity)
 
 

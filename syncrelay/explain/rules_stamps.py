@@ -329,6 +329,7 @@ def duplicates(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     count = an_input.figures.duplicates
     if facts.by_stamp and not facts.is_held(index) and count > _FAULTY * an_input.figures.fed:
         text = f"{counted(count, an_input.figures.fed)} messages of {an_input.name} repeat the stamp before them"
+        text += f": all are multiples of {words.duration(unit)}" if (unit := an_input.figures.resolution) else ""
         yield Fault(text, f"check how {nodes(an_input)} stamps its messages", explains=_matters(facts, an_input, count))
 
 
