@@ -104,7 +104,8 @@ def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
     if len(last) < _SHOW_A_UNIT or last[-1][1] - last[0][1] < _WATCHED:
         return None
     scatter = _scatter(last, lambda stamp: stamp)
-    if scatter < _LEAST_SCATTER:
+    # Coarse stamps scatter by as much as they are rounded.
+    if scatter < max(_LEAST_SCATTER, 2 * resolution(stamps)):
         return None
     return _of_parts(last, scatter) or _of_rate(last, scatter)
 

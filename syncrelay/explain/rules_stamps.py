@@ -358,7 +358,7 @@ def may_drift(facts: GroupFacts) -> bool:
     if tolerance is None or facts.is_recorded or not 0 < watched < _DRIFT_PROVEN:
         return False
     nearest = facts.figures.nearest_since if facts.is_silent else facts.figures.nearest
-    if not nearest.share_over(tolerance.ns):
+    if not nearest.share_over(tolerance.ns) or any(each.figures.resolution > tolerance.ns for each in facts.inputs):
         return False
     required = [each.figures for each in facts.inputs if each.required]
     young = [each.flows_since or facts.figures.now for each in required if each.drift is None]

@@ -103,7 +103,8 @@ def _shift(rig: Rig, flow: Flow, by: int, codes: str) -> Truth | None:
     phase = int(np.median(flow.true[:n] - pivot.true[:n])) if is_same else 0
     late = max(each.lateness for each in rig.flows) - min(each.lateness for each in rig.flows)
     # Of two, whose stamps are off by less than they are late by, either may be.
-    either = len(rig.flows) == 2 and abs(by) < max(100 * MS, 2 * late)
+    delay = float(np.median(flow.received - (flow.stamps - BEGAN)))
+    either = len(rig.flows) == 2 and (abs(by) < max(100 * MS, 2 * late) or 0 <= delay < 100 * MS)
     truth = _truth(codes, flow, rig.seen(), (abs(by), abs(by + phase)), moments=True)
     return (
         Truth(truth.codes, frozenset(each.topic for each in rig.flows), truth.seen, truth.sizes, moments=True)
