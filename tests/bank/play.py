@@ -265,12 +265,16 @@ def _figures(text: str, unit: str) -> list[float]:
 
 
 def _wrong_with_cure(draw: Drawn, finding: Finding) -> str | None:
-    """Say what is wrong with the group, had it what was suggested; None if all is well."""
-    text = (
-        (finding.suggestion or "").split(", or ")[0].split("; ")[0]
-        if finding.code is not Code.OTHER_CLOCK
-        else finding.suggestion or ""
-    )
+    """Say what is wrong with the group, had it what was suggested; None if all is well.
+
+    What is off by seconds may be of another clock or take that long: it says what to write in either case.
+    """
+    offers = re.split(r", or |; ", finding.suggestion or "")
+    tried = [_wrong_with(draw, each) for each in (offers if finding.code is Code.OTHER_CLOCK else offers[:1])]
+    return None if None in tried else tried[-1]
+
+
+def _wrong_with(draw: Drawn, text: str) -> str | None:
     offers = list(_OFFER.finditer(text))
     if not offers:
         return "nothing offered"
