@@ -33,6 +33,7 @@ def check_groups(groups: Sequence[GroupConfig], document: Document) -> Iterator[
         yield from _restamp(group, document)
         yield from _trigger(group, document)
         yield from _clock(group, document)
+        yield from _device_clocks(group, document)
         yield from _times_of_arrival(group, document)
         yield from _keys(group, document)
         yield from _optional_inputs(group, document)
@@ -142,6 +143,18 @@ def _times_of_arrival(group: GroupConfig, document: Document) -> Iterator[Proble
         " message"
     )
     yield document.problem((*received[0], "stamp"), text, code="conflict")
+
+
+def _device_clocks(group: GroupConfig, document: Document) -> Iterator[Problem]:
+    """Yield inputs whose stamps are to be mapped and are none, and delays that nothing takes off."""
+    for path, topic in group.paths():
+        at_clock, at_delay = (*path, "clock"), (*path, "delay")
+        if topic.is_of_device and topic.stamp == "receive":
+            text = "`stamp: receive` is of this host's time already: write one of the two"
+            yield document.problem(at_clock, text, code="conflict")
+        elif topic.delay_ns and not topic.is_of_device and at_clock not in document.faulty:
+            text = "a delay is taken off with `clock: device` only; `offset` shifts other stamps"
+            yield document.problem(at_delay, text, code="conflict")
 
 
 def _inputs(group: GroupConfig) -> list[str]:

@@ -90,6 +90,25 @@ class Topic(Keys):
         ),
         examples=["header", "receive", {"field": "status.stamp"}],
     )
+    clock: Literal["host", "device"] = Field(
+        default="host",
+        description=(
+            "Which clock made the stamps. Those of a `device` with a clock of its own are mapped to the host's time"
+            " before they are matched, from when its messages arrive: its rate, and whether it was set or began anew,"
+            " are found out. The set's common stamp, where `restamp` gives one, is of the host's time too."
+            " Default: host, nothing is mapped."
+        ),
+        examples=["device"],
+    )
+    delay: Duration = Field(
+        default=0,
+        description=(
+            "With `clock: device`, what is known of the least time from a stamp to the message's arrival, such as 8ms"
+            " of exposure and transfer: the mapping cannot tell it from the clock, and it is taken off. A number is"
+            " seconds, a string has a unit (ns, us, ms, s, min). Default: 0."
+        ),
+        examples=["8ms"],
+    )
 
 
 class KeyedTopic(Topic):

@@ -1,8 +1,9 @@
 """Groups with every default filled in; of a file with faults, as far as they could be read."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
+from syncrelay.clock import DeviceClock, Step
 from syncrelay.config.file import FileKeys
 from syncrelay.config.listen import DEFAULT_HOST, DEFAULT_PORTS, Listen, parse_listen
 from syncrelay.config.models import Group, Inputs, PacedTopic, StampSource, Tolerance, Topic
@@ -19,7 +20,8 @@ class TopicConfig:
 
     `type` is None where no group of the file says it: the graph or the recording does. `stamp` is "header", "receive"
     or a StampField with the path of the field; `key` the path of the field to match by, None where stamps are matched.
-    `tolerance` is how far its stamps may be from those of its set, None where any distance will do.
+    `tolerance` is how far its stamps may be from those of its set, None where any distance will do. Where
+    `is_of_device`, its stamps are of a clock of its own, and its messages arrive no sooner than `delay_ns` after them.
     """
 
     topic: str
@@ -32,6 +34,12 @@ class TopicConfig:
     required: bool
     key: str | None
     tolerance: Tolerance | None
+    is_of_device: bool = False
+    delay_ns: int = 0
+
+    def device_clock(self, stepped: Callable[[Step], None] | None = None) -> DeviceClock | None:
+        """Return what maps its stamps from now on, and who hears of steps; None where they are of the host's time."""
+        return DeviceClock(delay_ns=self.delay_ns, stepped=stepped) if self.is_of_device else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +155,8 @@ def _topic(topic: Topic, group: Group, *, name: str) -> TopicConfig:
         required=topic.required,
         key=group.key_of(topic),
         tolerance=group.tolerance_of(topic),
+        is_of_device=topic.clock == "device",
+        delay_ns=topic.delay,
     )
 
 

@@ -6,13 +6,14 @@ from collections.abc import Callable, Hashable, Mapping
 from contextlib import suppress
 from typing import NamedTuple, TypeVar
 
+from syncrelay.clock import Step
 from syncrelay.config import GroupConfig
 from syncrelay.config.installed import policy_name, suspects
 from syncrelay.dataflow.backend import Outlet
 from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
 from syncrelay.dataflow.flow import Engine, Flow, Refusals, Unpublished
 from syncrelay.dataflow.manifest_queue import GroupManifests
-from syncrelay.explain import Code, RecentDrop, Stamps, Tape
+from syncrelay.explain import Code, RecentDrop, Stamps, Tape, words
 from syncrelay.runtime import SYSTEM, Runtime
 from syncrelay.sync import DropReason, SyncGroup
 from syncrelay.sync.counts import InputCounts
@@ -22,6 +23,7 @@ _Result = TypeVar("_Result")
 
 # What is held while a group is suspended, which takes some tenths of a second.
 _HELD = 10_000
+_SAID_AGAIN = 10_000_000_000
 
 
 class Batch(NamedTuple):
@@ -38,6 +40,28 @@ class Batch(NamedTuple):
     counts: tuple[InputCounts, ...]
     n_sets: int
     last: tuple[Stamps | RecentDrop, ...]
+
+
+class Steps:
+    """Says that a device's clock was set, once in a while: of two clocks in turn, each message is a step."""
+
+    def __init__(self, group: str, topic: str) -> None:
+        self._group, self._topic = group, topic
+        self._said = 0
+
+    def say(self, step: Step) -> None:
+        """Say it, if that was not said lately."""
+        if abs(step.at - self._said) < _SAID_AGAIN:
+            return
+        self._said = step.at
+        _LOG.warning(
+            "%s: stamps of %s jumped %s by %s: its clock was set or began anew, and is mapped anew from here",
+            self._group,
+            self._topic,
+            "forward" if step.by > 0 else "back",
+            words.span_of_time(abs(step.by)),
+            extra={"group": self._group, "finding": Code.CLOCK_STEP.value},
+        )
 
 
 class GroupRelay:
@@ -60,6 +84,8 @@ class GroupRelay:
         self.config = config
         self._n_inputs = len(config.topics)
         self.flow = flow(config, now=now, refusals=Refusals(config.name), tape=tape or Tape(runtime=runtime))
+        self.clocks = tuple(topic.device_clock(Steps(config.name, topic.topic).say) for topic in config.topics)
+        """What maps the stamps of each input to the host's time; None where they are of it."""
         self.failure: str | None = None
         """What stopped it; None while it works."""
         self.paused_since: int | None = None

@@ -3,10 +3,11 @@
 Pure: values in, values out. The running relay and the analysis of recordings both ask here.
 """
 
+from syncrelay.clock import Step
 from syncrelay.config import Tolerance
 from syncrelay.config.profile import Mismatch
 from syncrelay.explain.cause_log import CauseLog
-from syncrelay.explain.clocks import STEP_NS, Step
+from syncrelay.explain.clocks import STEP_NS
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import BOUNDS_NS, Distribution, Histogram
 from syncrelay.explain.dry_run import UNREADABLE, EngineDriver

@@ -8,6 +8,8 @@ from operator import mul, sub
 from statistics import fmean, median, median_low
 from typing import Final, NamedTuple
 
+from syncrelay.clock import Step
+
 _FEWEST = 5
 _PARTS = 4
 # A slope from few points may be off by more than its standard error says.
@@ -105,13 +107,6 @@ _USUAL: Final = 60
 _LIVE: Final = 10 * _SECOND
 _WINDOW: Final = 10 * _SECOND
 _TOLD: Final = 30 * _SECOND
-
-
-class Step(NamedTuple):
-    """When stamps stepped, and by how much: positive where they jumped forward."""
-
-    at: int
-    by: int
 
 
 class StampSteps:

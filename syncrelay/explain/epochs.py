@@ -4,7 +4,9 @@ One table of hypotheses is tried on the stamps against the times of receipt. The
 change; a wrong one leaves a saw-tooth or a slope that no clock has.
 """
 
+from collections import Counter
 from collections.abc import Callable, Sequence
+from operator import sub
 from statistics import median
 from typing import Final, NamedTuple
 
@@ -23,6 +25,8 @@ _TIME_SCALES: Final = (
 _ZONE: Final = 1800 * _SECOND
 _MOST_ZONES: Final = 28
 _FROM_BOOT: Final = "count from boot or the start of a simulation, not from 1970"
+# A sensor is as regular as its stamps say if so many of its periods are the same.
+_REGULAR: Final = 0.8
 # The newest messages are read: those of this long, but no fewer than the first number, and of them about the second.
 # Two show a unit, as no clock runs 1,000 times too fast; any other rate takes more.
 _LATELY: Final = 10 * _SECOND
@@ -111,9 +115,13 @@ def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
 
 
 def resolution(stamps: Sequence[int]) -> int:
-    """Return of which unit all the last stamps are multiples, in nanoseconds: 1 s, 100 or 10 ms; 0 of none of these."""
+    """Return of which unit all the last stamps are multiples, in nanoseconds: 1 s, 100 or 10 ms; 0 of none of these.
+
+    0 too of a sensor that is as regular as that: its stamps may have been rounded, or not.
+    """
     last = stamps[-_ENOUGH:]
-    if len(last) < _FEWEST:
+    periods = Counter(map(sub, last[1:], last))
+    if len(last) < _FEWEST or max(periods.values()) > _REGULAR * len(last):
         return 0
     return next((unit for unit in _RESOLUTIONS if not any(stamp % unit for stamp in last)), 0)
 

@@ -4,9 +4,9 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple, TypedDict
 
+from syncrelay.clock import Step
 from syncrelay.config import Distance, Tolerance
 from syncrelay.config.profile import Mismatch, Profile
-from syncrelay.explain.clocks import Step
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.standing import Standing
 from syncrelay.explain.suggester import Suggester

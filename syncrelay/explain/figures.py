@@ -6,7 +6,8 @@ from operator import sub
 from statistics import median_low
 from typing import Final
 
-from syncrelay.explain.clocks import Drift, Step
+from syncrelay.clock import Step
+from syncrelay.explain.clocks import Drift
 from syncrelay.explain.distribution import EMPTY, NOTHING, Distribution, Histogram
 from syncrelay.explain.epochs import Reading
 from syncrelay.explain.standing import NOT_KNOWN, Share

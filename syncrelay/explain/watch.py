@@ -4,8 +4,8 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from typing import Unpack
 
+from syncrelay.clock import Step
 from syncrelay.config import GroupConfig
-from syncrelay.explain.clocks import Step
 from syncrelay.explain.facts import Around, GroupFacts, InputFacts, InputGraph, serving
 from syncrelay.explain.findings import SECOND
 from syncrelay.explain.input_observation import Arrivals

@@ -155,7 +155,8 @@ def handler(group: GroupRelay, index: int, message_type: Any) -> Deliver:
     """
     topic = group.config.topics[index]
     read = stamp_reader(topic.stamp, message_type)
-    if read is read_stamp and topic.key is None:
+    clock = group.clocks[index]
+    if read is read_stamp and topic.key is None and clock is None:
         return group.flow.by_header(index, group.fail)
     read_key = None if topic.key is None else value_reader(message_type, topic.key)
     has_place = None
@@ -170,6 +171,8 @@ def handler(group: GroupRelay, index: int, message_type: Any) -> Deliver:
             # Without a key, or without a place for the common stamp, a message counts as malformed.
             if (read_key and key is None) or (has_place and not has_place(content)):
                 stamp = None
+            elif clock is not None and stamp is not None:
+                stamp = clock.host_time(stamp, payload.received)
             group.flow.receive(index, payload, stamp, key)
         except Exception as error:  # noqa: BLE001  it stops the group alone
             group.fail(error)

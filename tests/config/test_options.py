@@ -85,6 +85,12 @@ def of_first_topic(name: str) -> Callable[[Config], object]:
     return lambda config: getattr(config.groups[0].topics[0], name)
 
 
+def host_time(config: Config) -> object:
+    """What a stamp of the first topic is matched by, that is received a second later."""
+    clock = config.groups[0].topics[0].device_clock()
+    return clock.host_time(5 * 1000 * MS, 6 * 1000 * MS) if clock else None
+
+
 NEAR_PAIRS = sets_of((0, 1), (1, 3), (0, 101), (1, 103), (0, 201), (1, 203))
 WIDER_PAIRS = sets_of((0, 100), (1, 110), (0, 200), (1, 210), (0, 300), (1, 310))
 ONE_INPUT_AHEAD = sets_of((0, 10), (0, 20), (1, 10))
@@ -155,6 +161,8 @@ OPTIONS: dict[str, Row] = {
     "manifest": of_group(own_topics, manifest=False),
     "qos": of_topic(of_first_topic("qos"), qos="sensor_data"),
     "stamp": of_topic(of_first_topic("stamp"), stamp="receive"),
+    "clock": of_topic(host_time, clock="device"),
+    "delay": of_topic(host_time, clock="device", delay="8ms"),
     "field": of_topic(of_first_topic("stamp"), stamp={"field": "header.stamp"}),
     "topics": of_topic(outputs, topic="/z"),
     "groups": (file(), file().replace("front", "back"), outputs),

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from syncrelay.clock import Step
 from syncrelay.config import load_text
 from syncrelay.explain import (
     Code,
@@ -21,7 +22,7 @@ from syncrelay.explain import (
     judge,
     with_ok,
 )
-from syncrelay.explain.clocks import Drift, Step
+from syncrelay.explain.clocks import Drift
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.judge import EXPLAINS, explained_by
 from syncrelay.sync import Match, Message

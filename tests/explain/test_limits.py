@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from syncrelay.clock import Step
 from syncrelay.config import Tolerance
 from syncrelay.explain import (
     Code,
@@ -25,7 +26,7 @@ from syncrelay.explain import (
     words,
 )
 from syncrelay.explain.cause_log import CauseLog
-from syncrelay.explain.clocks import Drift, Step
+from syncrelay.explain.clocks import Drift
 from syncrelay.explain.epochs import time_scale
 from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.input_observation import InputObservation

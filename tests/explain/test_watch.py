@@ -2,9 +2,9 @@
 
 import pytest
 
+from syncrelay.clock import Step
 from syncrelay.config import load_text
 from syncrelay.explain import ClockState, Endpoint, GroupWatch, InputGraph, Refusal, Tolerance
-from syncrelay.explain.clocks import Step
 from syncrelay.sync.counts import InputCounts
 from tests.explain.support.groups import BEGAN, IMAGE, MS, S
 from tests.ros.configs import config

@@ -1,5 +1,6 @@
 """Who only looks publishes nothing, and who relays tells of others that publish the same outputs."""
 
+import re
 import sys
 
 import pytest
@@ -61,7 +62,8 @@ def test_a_file_is_tried_on_a_terminal_and_one_that_fits_is_written(stage: Stage
     shown, told = look.written.split("\x1b[?1049l")
     assert "with tried.yaml" in shown
     assert "would have left: 0 sets" in told
-    assert "exit code 1: front has 1 error" in told
+    # An error once the group is silent, which takes longer than to see why.
+    assert re.search("exit code 1: front has 1 (warning|error)", told)
     lines = told.splitlines()[1:]
     assert [line for line in lines if len(line) > 70 and not line.startswith("    ")] == []
     (group,) = load_text((stage.folder / "new.yaml").read_text()).groups

@@ -16,7 +16,7 @@ from syncrelay.recordings.bag.columns import (
     Columns,
     Nanoseconds,
     ReadColumn,
-    column_reader,
+    column_readers,
     in_order,
     keys_in_order,
     stamp_or_receipt_column,
@@ -60,7 +60,7 @@ class Stream:
             self.keys += column.keys or repeat(None, len(column.places))
 
 
-_Wanted: TypeAlias = tuple[str, StampSource, str | None, bool]
+_Wanted: TypeAlias = tuple[str, StampSource, str | None, bool, bool, int]
 _Filled: TypeAlias = list[tuple[Stream, list[tuple[Channel, ReadColumn]]]]
 
 
@@ -77,11 +77,10 @@ def read_streams(recording: Recording, bindings: Sequence[GroupBinding]) -> tupl
         for index, each in enumerate(binding.inputs):
             topic = each.config
             needs_place = binding.group.restamp is not None and topic.stamp != "header"
-            wanted = (each.topic, topic.stamp, topic.key, needs_place)
+            wanted = (each.topic, topic.stamp, topic.key, needs_place, topic.is_of_device, topic.delay_ns)
             if wanted not in streams:
                 streams[wanted] = Stream(each.topic, topic.type or "", keys=None if topic.key is None else [])
-                readers = [(channel, column_reader(binding.group, index, channel)) for channel in each.channels]
-                filled.append((streams[wanted], readers))
+                filled.append((streams[wanted], column_readers(binding.group, index, each.channels)))
             of_group.append(streams[wanted])
         chosen.append(tuple(of_group))
     _pour(recording, filled)

@@ -1,6 +1,6 @@
 """Stamps and keys of a batch of messages as columns: the stamps of leading headers are read all at once."""
 
-from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import chain, repeat
 from typing import Final, NamedTuple, TypeAlias
@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from syncrelay.cdr import LATEST_STAMP, read_stamp
+from syncrelay.clock import DeviceClock
 from syncrelay.config import GroupConfig, StampSource
 from syncrelay.explain import UNREADABLE
 from syncrelay.recordings.bag.definitions import begins_with_header
@@ -63,15 +64,32 @@ ReadColumn: TypeAlias = Callable[[Batch, Places], tuple[Nanoseconds, Sequence[Ha
 """From some places of a batch to the stamps (or UNREADABLE) and the keys of its messages."""
 
 
-def column_reader(group: GroupConfig, index: int, channel: Channel) -> ReadColumn:
-    """Return what reads the messages of a channel for one input of a group, as `message_reader` does one by one.
+def column_readers(group: GroupConfig, index: int, channels: Iterable[Channel]) -> list[tuple[Channel, ReadColumn]]:
+    """Return what reads the messages of each channel of one input of a group, as `message_reader` does one by one.
 
-    Raises BagError where the channel's type has no such stamp or key.
+    Raises BagError where a channel's type has no such stamp or key.
     """
     topic = group.topics[index]
-    if topic.key is None and (group.restamp is None or topic.stamp == "header"):
-        return _stamp_column(topic.stamp, channel)
-    return _one_by_one(message_reader(group, index, channel))
+    clock = topic.device_clock()
+
+    def reader(channel: Channel) -> ReadColumn:
+        if topic.key is None and (group.restamp is None or topic.stamp == "header"):
+            read = _stamp_column(topic.stamp, channel)
+        else:
+            read = _one_by_one(message_reader(group, index, channel))
+        return read if clock is None else _mapped(read, clock)
+
+    return [(channel, reader(channel)) for channel in channels]
+
+
+def _mapped(read: ReadColumn, clock: DeviceClock) -> ReadColumn:
+    def read_mapped(batch: Batch, places: Places) -> tuple[Nanoseconds, Sequence[Hashable] | None]:
+        stamps, keys = read(batch, places)
+        rows = zip(stamps.tolist(), batch.received[places].tolist(), strict=True)
+        mapped = [each if each == UNREADABLE else clock.host_time(each, received) for each, received in rows]
+        return np.array(mapped, dtype=np.int64), keys
+
+    return read_mapped
 
 
 def stamp_or_receipt_column(channel: Channel) -> ReadColumn:

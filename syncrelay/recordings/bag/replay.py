@@ -6,7 +6,7 @@ from typing import Any, Final, TypeAlias
 
 from syncrelay.explain import UNREADABLE, EngineDriver
 from syncrelay.recordings.bag.bindings import GroupBinding
-from syncrelay.recordings.bag.columns import Batch, Columns, ReadColumn, column_reader
+from syncrelay.recordings.bag.columns import Batch, Columns, ReadColumn, column_readers
 from syncrelay.recordings.bag.recording import Channel, RawMessage, Recording
 from syncrelay.sync import InputCounts, Message, Outcome
 
@@ -42,7 +42,7 @@ class GroupReplay:
     def readers(self) -> Iterator[list[tuple[Channel, ReadColumn]]]:
         """Yield the readers of each input's channels; raises BagError for a stamp or key that a type does not have."""
         for index, each in enumerate(self.binding.inputs):
-            yield [(channel, column_reader(self.binding.group, index, channel)) for channel in each.channels]
+            yield column_readers(self.binding.group, index, each.channels)
 
     def result(self) -> GroupResult:
         """Return the counts so far."""

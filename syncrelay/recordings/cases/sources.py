@@ -6,6 +6,7 @@ from itertools import takewhile
 from typing import Final, NamedTuple
 
 from syncrelay.cdr import LATEST_STAMP
+from syncrelay.clock import DeviceClock
 from syncrelay.config import GroupConfig
 from syncrelay.explain import UNREADABLE
 from syncrelay.recordings.analysis.streams import Stream
@@ -141,13 +142,16 @@ def _disturbed(
             found.append(each)
     by_receipt = sorted(found, key=lambda each: each.received)
     idle = [sentence for each in at_work.values() for sentence in each.idle()]
-    return [_stamped(each, group) for each in by_receipt], idle
+    clocks = [topic.device_clock() for topic in group.topics]
+    return [_stamped(each, group, clocks[each.input]) for each in by_receipt], idle
 
 
-def _stamped(arrival: Arrival, group: GroupConfig) -> Arrival:
-    if group.topics[arrival.input].stamp == "receive" and arrival.stamp != UNREADABLE:
-        return arrival._replace(stamp=arrival.received)
-    return arrival
+def _stamped(arrival: Arrival, group: GroupConfig, clock: DeviceClock | None) -> Arrival:
+    if arrival.stamp == UNREADABLE:
+        return arrival
+    if clock is not None:
+        return arrival._replace(stamp=clock.host_time(arrival.stamp, arrival.received))
+    return arrival._replace(stamp=arrival.received) if group.topics[arrival.input].stamp == "receive" else arrival
 
 
 def _clamped(stamp: int) -> int:

@@ -1,0 +1,5 @@
+"""What stamps and times of receipt tell of the clock that made the stamps. Sans-IO, without ROS and without groups."""
+
+from syncrelay.clock.device_clock import DeviceClock, Step
+
+__all__ = ["DeviceClock", "Step"]
