@@ -1,5 +1,6 @@
 """What stamps and times of receipt tell of the clock that made the stamps. Sans-IO, without ROS and without groups."""
 
 from syncrelay.clock.device_clock import DeviceClock, Step
+from syncrelay.clock.envelope import MOST_RATE
 
-__all__ = ["DeviceClock", "Step"]
+__all__ = ["MOST_RATE", "DeviceClock", "Step"]

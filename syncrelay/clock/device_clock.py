@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from syncrelay.clock.envelope import Envelope
+from syncrelay.clock.envelope import LEAST_JITTER, Envelope
 
 _SECOND: Final = 1_000_000_000
 # Stamps that fall by more have jumped, as in the engine.
@@ -36,6 +36,8 @@ _LASTED: Final = 0.5
 _LIKELY: Final = 1.5
 _LIKELY_ABOVE: Final = 6.0
 _KEPT: Final = 400
+# The usual period follows a change within so many messages.
+_PERIODS: Final = 10
 # The jitter is the mean of so many messages. One that is far later than all others is not counted in full.
 _REMEMBERED: Final = 200.0
 _OUTLIER: Final = 8.0
@@ -47,6 +49,14 @@ class Step(NamedTuple):
 
     at: int
     by: int
+
+
+class _Mapped(NamedTuple):
+    """The last stamp, its time of receipt, and what it was mapped to."""
+
+    stamp: int
+    received: int
+    mapped: int
 
 
 class _Rise:
@@ -93,8 +103,7 @@ class DeviceClock:
         self._jitter = self._jitter_of = 0.0
         self._period: float | None = None
         self._rise: _Rise | None = None
-        # The last stamp, its time of receipt, and what it was mapped to.
-        self._before: tuple[int, int, int] | None = None
+        self._before: _Mapped | None = None
 
     def host_time(self, stamp: int, received: int) -> int:
         """Return the host's time of a stamp that was received now. A stamp of 0 was never set, and stays."""
@@ -103,20 +112,19 @@ class DeviceClock:
         before = self._before
         if before is None:
             self._begin(stamp, received)
-            x = y = height = told = period = 0.0
-        else:
-            x, y = (stamp - self._device_0) / _SECOND, (received - stamp - self._behind) / _SECOND
-            height, told, period = self._line.height(x, y), 1.0, (stamp - before[0]) / _SECOND
-            if period > 0:
-                told = min(1.0, max(0.0, (received - before[1]) / _SECOND / period))
+            self._take(0.0, 0.0)
+            return self._mapped(stamp, received, 0.0)
+        x, y = self._point(stamp, received)
+        height, period = self._line.height(x, y), (stamp - before.stamp) / _SECOND
+        told = min(1.0, max(0.0, (received - before.received) / _SECOND / period)) if period > 0 else 1.0
         if x < self._newest - _JUMP or height < -self._least_step():
             # Of stamps that jumped far, the line tells nothing: as late as the newest would be, this one is.
             self._step(stamp, received, self._line.height(self._newest, y))
             x = y = height = 0.0
-        elif height >= _ABOVE * self._jitter + _LEAST_ABOVE and self._count > _FEWEST:
+        elif height >= _ABOVE * self._jitter + _LEAST_ABOVE and self._count > _FEW:
             self._rises(stamp, received, height, told, period)
             if self._rise is None:
-                x, y = (stamp - self._device_0) / _SECOND, (received - stamp - self._behind) / _SECOND
+                x, y = self._point(stamp, received)
                 height = self._line.height(x, y)
         elif self._rise is not None:
             # They were late, and no clock was set: that is jitter.
@@ -129,11 +137,15 @@ class DeviceClock:
         self._count_on(period)
         return self._mapped(stamp, received, x)
 
+    def _point(self, stamp: int, received: int) -> tuple[float, float]:
+        """Return a message's time by its clock and its delay, both since the epoch began, in seconds."""
+        return (stamp - self._device_0) / _SECOND, (received - stamp - self._behind) / _SECOND
+
     def _count_on(self, period: float) -> None:
         """Learn how far apart stamps usually are."""
         if period > 0:
             usual = self._period or period
-            self._period = usual + 0.1 * (min(max(period, usual / 2), 2 * usual) - usual)
+            self._period = usual + (min(max(period, usual / 2), 2 * usual) - usual) / _PERIODS
 
     def _mapped(self, stamp: int, received: int, x: float) -> int:
         line, rise, before = self._line, self._rise, self._before
@@ -143,12 +155,12 @@ class DeviceClock:
         # Nothing is received before its time.
         mapped = min(stamp + self._behind + int((level + line.rate * x) * _SECOND), received)
         if before is not None:
-            if stamp == before[0]:
-                mapped = before[2]
-            elif stamp > before[0] and mapped <= before[2]:
-                # The line falls as it gets to know quicker messages; time does not.
-                mapped = before[2] + 1
-        self._before = stamp, received, mapped
+            if stamp == before.stamp:
+                mapped = before.mapped
+            elif stamp > before.stamp and mapped <= before.mapped <= received:
+                # The line falls as it gets to know quicker messages; time does not, unless this machine's was set back.
+                mapped = before.mapped + 1
+        self._before = _Mapped(stamp, received, mapped)
         return mapped - self._delay
 
     def _begin(self, stamp: int, received: int) -> None:
@@ -165,7 +177,7 @@ class DeviceClock:
     def _least_step(self) -> float:
         if self._jitter_of < _FEW:
             return _STEP_OF_ANY
-        return _UNDER * self._jitter / min(1.0, (self._count or 1) / _FEW) + _LEAST_UNDER
+        return _UNDER * self._jitter / min(1.0, self._count / _FEW) + _LEAST_UNDER
 
     def _take(self, x: float, y: float) -> None:
         self._count += 1
@@ -192,10 +204,10 @@ class DeviceClock:
         rise.least = min(rise.least, height)
         rise.arrivals.append((stamp, received))
         rise.heights.append((height, told))
-        far = min(rise.least / (self._jitter + 1e-5), _FAR)
+        far = min(rise.least / max(self._jitter, LEAST_JITTER), _FAR)
         if received - rise.since < _LASTED * _SECOND or rise.told < _FEWEST or rise.told * far < _EVIDENCE:
             return
         *earlier, _ = rise.arrivals
         self._step(*earlier[0], rise.least)
-        for each_stamp, each_received in earlier:
-            self._take((each_stamp - self._device_0) / _SECOND, (each_received - each_stamp - self._behind) / _SECOND)
+        for each in earlier:
+            self._take(*self._point(*each))

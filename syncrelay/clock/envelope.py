@@ -20,13 +20,15 @@ _LONGEST: Final = 1500.0
 _WANDER: Final = 0.02e-6
 _SHARE_OF_JITTER: Final = 0.05
 _LEAST_MOVED: Final = 1e-4
-_LEAST_JITTER: Final = 2e-5
+LEAST_JITTER: Final = 2e-5
+"""What takes less is below what systems tell of times."""
 # Oscillators are mostly within so much of true time. One that was watched for so long keeps its rate within so much.
 _USUAL_RATE: Final = 100e-6
 _KNOWN_AFTER: Final = 20.0
 _SAME_RATE: Final = 5e-6
 MOST_RATE: Final = 1500e-6
-"""No oscillator is farther off: what is no clock of a device, such as simulated time, is not followed."""
+"""Oscillators are within some 100 ppm, bad ones within 1,000. What is farther off does not drift: it has another rate,
+as simulated time may, and is not followed."""
 
 
 class Envelope:
@@ -61,16 +63,14 @@ class Envelope:
 
     def add(self, x: float, y: float, jitter: float) -> None:
         """Take a point, and how far points usually lie above the line."""
-        height = y - self.level - self.rate * x
-        if height < 0:
-            self.level += height
+        self.level += min(0.0, self.height(x, y))
         self._count += 1
         if self._count == 1 or y - self.rate * x < self._lowest[1] - self.rate * self._lowest[0]:
             self._lowest = x, y
         if x >= self._until:
             self._points.append((*self._lowest, self._count))
             self._count, self._until = 0, x + _WIDTH
-            self._fit(x, jitter + _LEAST_JITTER)
+            self._fit(x, max(jitter, LEAST_JITTER))
 
     def _fit(self, now: float, jitter: float) -> None:
         if len(self._points) > _MOST:

@@ -130,19 +130,24 @@ def _clock(group: GroupConfig, document: Document) -> Iterator[Problem]:
 
 
 def _times_of_arrival(group: GroupConfig, document: Document) -> Iterator[Problem]:
-    """Yield an input matched by its time of arrival where stamps must be equal: they never are, to the nanosecond."""
+    """Yield an input matched by its time of arrival, or by a stamp mapped by it, where stamps must be equal.
+
+    They never are, to the nanosecond.
+    """
     tolerance = group.options.tolerance
-    received = [path for path, topic in group.paths() if topic.stamp == "receive"]
+    received = [
+        ((*path, "stamp"), "a time of arrival") if topic.stamp == "receive" else ((*path, "clock"), "a mapped stamp")
+        for path, topic in group.paths()
+        if topic.stamp == "receive" or topic.is_of_device
+    ]
     if not received or tolerance is None or tolerance.takes_times_of_arrival:
         return
+    path, what = received[0]
     needed_by, instead = f"`{tolerance.key}: 0`", f"a larger `{tolerance.key}`, such as 20ms"
     if tolerance.wider_policy is not None:
         needed_by, instead = group.options.policy, f"`policy: {tolerance.wider_policy}` with a `{tolerance.key}`"
-    text = (
-        f"a time of arrival never equals another stamp, as {needed_by} needs it: write {instead}, or use a stamp of the"
-        " message"
-    )
-    yield document.problem((*received[0], "stamp"), text, code="conflict")
+    text = f"{what} never equals another stamp, as {needed_by} needs it: write {instead}, or use a stamp of the message"
+    yield document.problem(path, text, code="conflict")
 
 
 def _device_clocks(group: GroupConfig, document: Document) -> Iterator[Problem]:
@@ -150,10 +155,13 @@ def _device_clocks(group: GroupConfig, document: Document) -> Iterator[Problem]:
     for path, topic in group.paths():
         at_clock, at_delay = (*path, "clock"), (*path, "delay")
         if topic.is_of_device and topic.stamp == "receive":
-            text = "`stamp: receive` is of this host's time already: write one of the two"
+            text = "`stamp: receive` is of this machine's time already: leave out one of the two"
+            yield document.problem(at_clock, text, code="conflict")
+        elif topic.is_of_device and group.inputs.node.use_sim_time:
+            text = "stamps cannot be mapped to simulated time, which `use_sim_time` goes by: leave out one of the two"
             yield document.problem(at_clock, text, code="conflict")
         elif topic.delay_ns and not topic.is_of_device and at_clock not in document.faulty:
-            text = "a delay is taken off with `clock: device` only; `offset` shifts other stamps"
+            text = "a delay is taken off with `clock: device` only: write that too, or an `offset`"
             yield document.problem(at_delay, text, code="conflict")
 
 

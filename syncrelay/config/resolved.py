@@ -37,6 +37,11 @@ class TopicConfig:
     is_of_device: bool = False
     delay_ns: int = 0
 
+    @property
+    def is_by_header(self) -> bool:
+        """Whether its messages are matched by the stamp of their header as it is."""
+        return self.stamp == "header" and not self.is_of_device
+
     def device_clock(self, stepped: Callable[[Step], None] | None = None) -> DeviceClock | None:
         """Return what maps its stamps from now on, and who hears of steps; None where they are of the host's time."""
         return DeviceClock(delay_ns=self.delay_ns, stepped=stepped) if self.is_of_device else None

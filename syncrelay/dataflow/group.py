@@ -23,6 +23,7 @@ _Result = TypeVar("_Result")
 
 # What is held while a group is suspended, which takes some tenths of a second.
 _HELD = 10_000
+# In nanoseconds.
 _SAID_AGAIN = 10_000_000_000
 
 
@@ -42,8 +43,8 @@ class Batch(NamedTuple):
     last: tuple[Stamps | RecentDrop, ...]
 
 
-class Steps:
-    """Says that a device's clock was set, once in a while: of two clocks in turn, each message is a step."""
+class DeviceSteps:
+    """Says that a device's clock stepped, once in a while: of two clocks in turn, each message is a step."""
 
     def __init__(self, group: str, topic: str) -> None:
         self._group, self._topic = group, topic
@@ -55,7 +56,8 @@ class Steps:
             return
         self._said = step.at
         _LOG.warning(
-            "%s: stamps of %s jumped %s by %s: its clock was set or began anew, and is mapped anew from here",
+            "%s: stamps of %s jumped %s by %s against this machine's clock, and are mapped anew from here: "
+            "one of the two clocks was set, or the device started again",
             self._group,
             self._topic,
             "forward" if step.by > 0 else "back",
@@ -84,7 +86,7 @@ class GroupRelay:
         self.config = config
         self._n_inputs = len(config.topics)
         self.flow = flow(config, now=now, refusals=Refusals(config.name), tape=tape or Tape(runtime=runtime))
-        self.clocks = tuple(topic.device_clock(Steps(config.name, topic.topic).say) for topic in config.topics)
+        self.clocks = tuple(topic.device_clock(DeviceSteps(config.name, topic.topic).say) for topic in config.topics)
         """What maps the stamps of each input to the host's time; None where they are of it."""
         self.failure: str | None = None
         """What stopped it; None while it works."""

@@ -7,7 +7,9 @@ from collections.abc import Mapping, Sequence
 from struct import Struct
 from typing import Final, NamedTuple
 
+from syncrelay.cdr import read_stamp
 from syncrelay.config import GroupConfig
+from syncrelay.dataflow.backend import Content
 
 MANIFEST_DEPTH: Final = 500
 """How many DDS keeps of a group: whoever joins sets needs each one, and a stall of some seconds must cost none."""
@@ -44,6 +46,11 @@ class Note(NamedTuple):
     unpublished: Mapping[int, str]
 
 
+def header_stamp(content: Content) -> int:
+    """Return the stamp of a header that begins a message; 0, as is never set, of one that is cut short."""
+    return read_stamp(content) or 0
+
+
 class ManifestWriter:
     """Serializes the manifests of a group.
 
@@ -55,6 +62,8 @@ class ManifestWriter:
         """Take the node's full name, and each input with its output, as the graph names them."""
         self._name, self._node = _text(config.name), _text(node)
         self._policy = _last_text(config.options.policy)
+        self.is_by_header = tuple(topic.is_by_header for topic in config.topics)
+        """Of which inputs a message's stamp is the one in its header."""
         self._offsets = tuple(topic.offset_ns for topic in config.topics)
         self._names = [(_text(output), _text(source)) for source, output in topics]
         self._templates: dict[tuple[object, ...], bytes] = {}

@@ -6,14 +6,14 @@ of manifests costs far less than the same manifests one by one.
 
 import logging
 from collections import deque
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Final
 
 from syncrelay.config.wording import counted
 from syncrelay.dataflow.backend import Outlet, PublishError
 from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.flow import Flow
-from syncrelay.dataflow.manifest import ManifestWriter, Note
+from syncrelay.dataflow.manifest import ManifestWriter, Note, header_stamp
 from syncrelay.runtime import SYSTEM, Runtime
 from syncrelay.sync import Match
 
@@ -25,13 +25,22 @@ MOST_NOTED: Final = 10_000
 """How many manifests of all groups may wait to be published: those of ten seconds at 1000 sets a second."""
 
 
-def _noted(flow: Flow, match: Match, latency: int) -> Note:
+def _noted(flow: Flow, match: Match, latency: int, is_by_header: Sequence[bool]) -> Note:
     """Note what the manifest of the set that was just sent tells. Its payloads are not kept: they may be large."""
     common, stamps = match.stamp, match.stamps
     left_as = stamps
     if common is not None:
         pairs = zip(stamps, flow.restamped, strict=True)
         left_as = tuple([common if restamped and stamp is not None else stamp for stamp, restamped in pairs])
+    elif not all(is_by_header):
+        # What was matched by another time leaves with the header that it came with.
+        rows = zip(match.messages, stamps, flow.restamped, is_by_header, strict=True)
+        left_as = tuple(
+            [
+                stamp if message is None or is_matched or not has_header else header_stamp(message.payload.content())
+                for message, stamp, has_header, is_matched in rows
+            ]
+        )
     received = [None if message is None else message.payload.received for message in match.messages]
     sent = [0 if outlet is None else outlet.sent for outlet in flow.outlets]
     unpublished = {index: each.why for index, each in flow.unpublished.items()}
@@ -58,7 +67,7 @@ class GroupManifests:
     def tell(self, flow: Flow, match: Match, latency: int) -> None:
         """Have a manifest published of the set that a flow just sent, if anyone subscribes. On the receive thread."""
         if self.is_heard and len(self._noted) < MOST_NOTED:
-            self._noted.append((self, _noted(flow, match, latency)))
+            self._noted.append((self, _noted(flow, match, latency, self._writer.is_by_header)))
         elif self.is_heard:
             self._left_out += 1
 

@@ -107,7 +107,7 @@ class Losses:
         return self._totals[-1] - self._totals[0] if self._totals else 0
 
 
-class _Step(NamedTuple):
+class _Came(NamedTuple):
     """What came of a publisher since the evaluation before."""
 
     sent: int
@@ -116,7 +116,7 @@ class _Step(NamedTuple):
     way: int | None = None
 
 
-_NOTHING: Final = _Step(0, 0)
+_NOTHING: Final = _Came(0, 0)
 
 
 class _Publisher:
@@ -126,13 +126,13 @@ class _Publisher:
         self.node = "a publisher that left"
         self.sent = self.delivered = 0
         self._last: Deliveries | None = None
-        self._steps: deque[_Step] = deque(maxlen=_RECENT)
+        self._lately: deque[_Came] = deque(maxlen=_RECENT)
         self._points: deque[tuple[int, int]] = deque(maxlen=_POINTS)
 
     def observe(self, now: Deliveries | None) -> None:
         """Take its counts, None where there are none."""
         before, self._last = self._last, now
-        step = _NOTHING
+        came = _NOTHING
         if now is not None:
             # One that is counted anew restarted, or the subscription was made anew.
             if before is not None and (before.first != now.first or before.newest > now.newest):
@@ -142,17 +142,17 @@ class _Publisher:
             # Without a gid its numbers may be those of several, until the next evaluation has seen that they rise.
             if before is not None or now.gid is not None:
                 sent, delivered = (before.sent, before.delivered) if before is not None else (0, 0)
-                step = _Step(now.sent - sent, now.delivered - delivered, now.longest_gap, now.least_way)
+                came = _Came(now.sent - sent, now.delivered - delivered, now.longest_gap, now.least_way)
             if not self._points or self._points[-1][0] != now.newest:
                 self._points.append((now.newest, now.published))
-        self._steps.append(step)
-        self.sent += step.sent
-        self.delivered += step.delivered
+        self._lately.append(came)
+        self.sent += came.sent
+        self.delivered += came.delivered
 
     @property
     def is_recent(self) -> bool:
         """Whether it is counted now, or was within the last evaluations."""
-        return self._last is not None or any(step.sent for step in self._steps)
+        return self._last is not None or any(each.sent for each in self._lately)
 
     @property
     def _rate(self) -> float | None:
@@ -164,14 +164,14 @@ class _Publisher:
 
     def sender(self) -> Sender:
         """Give it as a value."""
-        steps = self._steps
+        lately = self._lately
         return Sender(
             self.node,
-            sent=sum(each.sent for each in steps),
-            delivered=sum(each.delivered for each in steps),
-            longest_gap=max((each.longest_gap for each in steps), default=0),
+            sent=sum(each.sent for each in lately),
+            delivered=sum(each.delivered for each in lately),
+            longest_gap=max((each.longest_gap for each in lately), default=0),
             sent_hz=self._rate,
-            way=min((each.way for each in steps if each.way is not None), default=None),
+            way=min((each.way for each in lately if each.way is not None), default=None),
             sent_in_all=self.sent,
             delivered_in_all=self.delivered,
         )

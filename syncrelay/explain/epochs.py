@@ -10,11 +10,11 @@ from operator import sub
 from statistics import median
 from typing import Final, NamedTuple
 
+from syncrelay.clock import MOST_RATE
+
 _SECOND: Final = 1_000_000_000
 BOOT_NS: Final = 365 * 86_400 * _SECOND
 """No machine runs for longer without a boot, nor has its clock been set before 1971."""
-MOST_DRIFT: Final = 2e-3
-"""Crystals are within some 100 ppm, bad ones within 1,000: what is off by more than this does not drift."""
 # For each time scale: how close stamps must be, how far it is behind UTC, and its name. GPS time began in 1980 and has
 # no leap seconds; TAI has 37 more.
 _TIME_SCALES: Final = (
@@ -139,7 +139,7 @@ def _of_parts(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:
 def _of_rate(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:
     """Return a reading by which stamps run faster or slower than time."""
     rate, first = _rate(last), last[0][0]
-    if rate <= 0 or abs(rate - 1) <= MOST_DRIFT:
+    if rate <= 0 or abs(rate - 1) <= MOST_RATE:
         return None
     if _scatter(last, lambda stamp: round((stamp - first) / rate)) > _BETTER * scatter:
         return None

@@ -357,8 +357,11 @@ class GroupFacts:
     @property
     def is_silent(self) -> bool:
         """Whether sets that should have come did not."""
-        is_resting = self.asleep or self.pause is not None or self.inactive is not None
-        return not is_resting and self.silent_for >= self.silent_after
+        return not self._is_resting and self.silent_for >= self.silent_after
+
+    @property
+    def _is_resting(self) -> bool:
+        return self.asleep or self.pause is not None or self.inactive is not None
 
     @property
     def has_stopped(self) -> bool:
@@ -367,8 +370,7 @@ class GroupFacts:
             return True
         required = [each.figures for each in self.inputs if each.required]
         flows = [each.flows_since for each in required if each.flows_since is not None]
-        is_resting = self.asleep or self.pause is not None or self.inactive is not None
-        if is_resting or len(flows) < len(required) or not self.possible_hz:
+        if self._is_resting or len(flows) < len(required) or not self.possible_hz:
             return False
         since = max(self.figures.now - self.silent_for, *flows)
         return self.figures.now - since >= max(_STOPPED, round(_STOPPED_SETS * _SECOND / self.possible_hz))

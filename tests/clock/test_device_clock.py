@@ -4,6 +4,8 @@ import random
 from statistics import fmean
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from syncrelay.clock import DeviceClock, Step
 from tests.clock import peers
@@ -92,3 +94,27 @@ def test_a_stamp_that_was_never_set_stays_so():
     assert clock.host_time(SECOND, NOW) == NOW
     assert clock.host_time(0, NOW + SECOND) == 0
     assert clock.host_time(2 * SECOND, NOW + SECOND) == NOW + SECOND
+
+
+@pytest.mark.parametrize("by_s", [-3600, -2, 2, 3600])
+def test_time_goes_on_where_this_machine_s_clock_is_set(by_s):
+    clock = DeviceClock()
+    for number in range(400):
+        now = NOW + (number * SECOND) // 20 + (by_s * SECOND if number >= 200 else 0)
+        host = clock.host_time(7 * SECOND + number * SECOND // 20, now + number % 7 * 100_000)
+        if not 200 <= number < 220:
+            assert abs(host - now) < SECOND // 1000
+
+
+@given(
+    st.lists(st.tuples(st.integers(-(2**31) * SECOND, 2**32 * SECOND), st.integers(0, 2**63 - 1)), max_size=60),
+    st.integers(0, 10**10),
+    st.booleans(),
+)
+def test_whatever_is_stamped_and_received_is_mapped_to_a_time(arrivals, delay, are_in_order):
+    """A recording may hold any numbers."""
+    clock = DeviceClock(delay_ns=delay)
+    for stamp, received in sorted(arrivals, key=lambda each: each[1]) if are_in_order else arrivals:
+        host = clock.host_time(stamp, received)
+        assert -(2**63) < host < 2**63
+        assert stamp or host == 0

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -14,16 +14,25 @@ from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.manifest import ManifestWriter
 from syncrelay.dataflow.manifest_queue import GroupManifests, ManifestQueue
 from tests.dataflow.payloads import Named, Outlet, connect, group_of
+from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.manifests import ERROR, OK, read
 from tests.ros.processes import wait_until
 from tests.ros.streams import BEGIN, MS
+
+
+class _Held(NamedTuple):
+    name: bytes
+    received: int = 0
+
+    def content(self) -> bytes:
+        return self.name
 
 
 class _Told:
     """A group of two inputs whose sets are told."""
 
     def __init__(self, queue: ManifestQueue, name: str = "front", **keys: Any) -> None:
-        self.group = group_of(name=name, topics=["/a", "/b"], **keys)
+        self.group = group_of(name=name, **{"topics": ["/a", "/b"], **keys})
         self.outlets, self.manifest = (Outlet(), Outlet()), Outlet()
         topics = [("/a", f"/{name}/a"), ("/b", f"/{name}/b")]
         writer = ManifestWriter(self.group.config, node="/syncrelay", topics=topics)
@@ -58,6 +67,20 @@ def _running(queue: ManifestQueue) -> Iterator[ThreadPoolExecutor]:
         finally:
             queue.stop()
         running.result()
+
+
+@pytest.mark.parametrize(("has_header", "expected"), [(True, [7, 1000]), (False, [900, 1000])])
+def test_what_is_matched_by_another_time_leaves_with_its_header(queue, has_header, expected):
+    of_device = {"topic": "/a", "type": VECTOR, "clock": "device"}
+    told = _Told(queue, topics=[of_device, "/b"], policy="approximate_time_eager", slop="50s")
+    for index, outlet in enumerate(told.outlets):
+        told.group.connect(index, outlet, restamped=has_header)
+    told.group.flow.receive(0, _Held(vector(7)), 900)
+    told.group.flow.receive(1, _Held(vector(999)), 1000)
+    queue.publish()
+    (manifest,) = map(read, told.manifest.log)
+    assert [each.stamp for each in manifest.inputs] == expected
+    assert [each.original_stamp for each in manifest.inputs] == [900, 1000]
 
 
 def test_what_could_not_be_published_is_told_as_it_was_when_the_set_left(queue):

@@ -8,6 +8,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
+from syncrelay.clock import DeviceClock
 from syncrelay.config import GroupConfig, StampSource
 from syncrelay.recordings.bag.bindings import GroupBinding
 from syncrelay.recordings.bag.columns import (
@@ -16,7 +17,7 @@ from syncrelay.recordings.bag.columns import (
     Columns,
     Nanoseconds,
     ReadColumn,
-    column_readers,
+    column_reader,
     in_order,
     keys_in_order,
     stamp_or_receipt_column,
@@ -61,7 +62,7 @@ class Stream:
 
 
 _Wanted: TypeAlias = tuple[str, StampSource, str | None, bool, bool, int]
-_Filled: TypeAlias = list[tuple[Stream, list[tuple[Channel, ReadColumn]]]]
+_Filled: TypeAlias = list[tuple[Stream, list[tuple[Channel, ReadColumn]], DeviceClock | None]]
 
 
 def read_streams(recording: Recording, bindings: Sequence[GroupBinding]) -> tuple[tuple[Stream, ...], ...]:
@@ -80,7 +81,8 @@ def read_streams(recording: Recording, bindings: Sequence[GroupBinding]) -> tupl
             wanted = (each.topic, topic.stamp, topic.key, needs_place, topic.is_of_device, topic.delay_ns)
             if wanted not in streams:
                 streams[wanted] = Stream(each.topic, topic.type or "", keys=None if topic.key is None else [])
-                filled.append((streams[wanted], column_readers(binding.group, index, each.channels)))
+                readers = [(channel, column_reader(binding.group, index, channel)) for channel in each.channels]
+                filled.append((streams[wanted], readers, topic.device_clock()))
             of_group.append(streams[wanted])
         chosen.append(tuple(of_group))
     _pour(recording, filled)
@@ -96,11 +98,11 @@ def read_topics(recording: Recording) -> tuple[tuple[Channel, Stream], ...]:
     for channel in recording.channels:
         found.setdefault((channel.topic, channel.type, channel.encoding), []).append(channel)
     filled: _Filled = [
-        (Stream(topic, type_name), [(channel, stamp_or_receipt_column(channel)) for channel in channels])
+        (Stream(topic, type_name), [(channel, stamp_or_receipt_column(channel)) for channel in channels], None)
         for (topic, type_name, _), channels in found.items()
     ]
     _pour(recording, filled)
-    return tuple((readers[0][0], stream) for stream, readers in filled)
+    return tuple((readers[0][0], stream) for stream, readers, _ in filled)
 
 
 def messages(streams: Sequence[Stream]) -> Iterator[Message]:
@@ -124,7 +126,7 @@ def stamped(group: GroupConfig, streams: Sequence[Stream]) -> list[Stream]:
 
 
 def _pour(recording: Recording, filled: _Filled) -> None:
-    columns = Columns([readers for _, readers in filled])
+    columns = Columns([readers for _, readers, _ in filled], [clock for _, _, clock in filled])
     begin = 0
     for batch in map(Batch, recording.batches(columns.channels)):
         for index, column in columns.read(batch):

@@ -1,6 +1,6 @@
 """Stamps and keys of a batch of messages as columns: the stamps of leading headers are read all at once."""
 
-from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import chain, repeat
 from typing import Final, NamedTuple, TypeAlias
@@ -64,32 +64,15 @@ ReadColumn: TypeAlias = Callable[[Batch, Places], tuple[Nanoseconds, Sequence[Ha
 """From some places of a batch to the stamps (or UNREADABLE) and the keys of its messages."""
 
 
-def column_readers(group: GroupConfig, index: int, channels: Iterable[Channel]) -> list[tuple[Channel, ReadColumn]]:
-    """Return what reads the messages of each channel of one input of a group, as `message_reader` does one by one.
+def column_reader(group: GroupConfig, index: int, channel: Channel) -> ReadColumn:
+    """Return what reads the messages of a channel for one input of a group, as `message_reader` does one by one.
 
-    Raises BagError where a channel's type has no such stamp or key.
+    Raises BagError where the channel's type has no such stamp or key.
     """
     topic = group.topics[index]
-    clock = topic.device_clock()
-
-    def reader(channel: Channel) -> ReadColumn:
-        if topic.key is None and (group.restamp is None or topic.stamp == "header"):
-            read = _stamp_column(topic.stamp, channel)
-        else:
-            read = _one_by_one(message_reader(group, index, channel))
-        return read if clock is None else _mapped(read, clock)
-
-    return [(channel, reader(channel)) for channel in channels]
-
-
-def _mapped(read: ReadColumn, clock: DeviceClock) -> ReadColumn:
-    def read_mapped(batch: Batch, places: Places) -> tuple[Nanoseconds, Sequence[Hashable] | None]:
-        stamps, keys = read(batch, places)
-        rows = zip(stamps.tolist(), batch.received[places].tolist(), strict=True)
-        mapped = [each if each == UNREADABLE else clock.host_time(each, received) for each, received in rows]
-        return np.array(mapped, dtype=np.int64), keys
-
-    return read_mapped
+    if topic.key is None and (group.restamp is None or topic.stamp == "header"):
+        return _stamp_column(topic.stamp, channel)
+    return _one_by_one(message_reader(group, index, channel))
 
 
 def stamp_or_receipt_column(channel: Channel) -> ReadColumn:
@@ -149,9 +132,15 @@ _IN_ONE_GO: Final[Mapping[ReadStamp, Callable[[Heads], Nanoseconds]]] = {
 
 
 class Columns:
-    """Reads the batches of a recording for inputs, each of which has one or more channels with their readers."""
+    """Reads the batches of a recording for inputs, each of which has one or more channels with their readers.
 
-    def __init__(self, inputs: Sequence[Sequence[tuple[Channel, ReadColumn]]]) -> None:
+    Where an input's stamps are of a device's clock, they are mapped by it.
+    """
+
+    def __init__(
+        self, inputs: Sequence[Sequence[tuple[Channel, ReadColumn]]], clocks: Sequence[DeviceClock | None] = ()
+    ) -> None:
+        self._clocks = {index: clock for index, clock in enumerate(clocks) if clock is not None}
         self._numbers: dict[Channel, int] = {}
         for channel, _ in chain.from_iterable(inputs):
             self._numbers.setdefault(channel, len(self._numbers))
@@ -170,7 +159,8 @@ class Columns:
         for index, each in enumerate(self._inputs):
             found = [Column(places[number], *read(batch, places[number])) for number, read in each if number in there]
             if found:
-                yield index, _combined(found)
+                column, clock = _combined(found), self._clocks.get(index)
+                yield index, column if clock is None else _mapped(column, batch, clock)
 
     def in_order(self, batch: Batch) -> Iterator[tuple[int, RawMessage, int, Hashable]]:
         """Yield the messages of a batch: index of the input, message, stamp (or UNREADABLE), key.
@@ -190,6 +180,13 @@ class Columns:
             whole.keys or repeat(None),
             strict=False,
         )
+
+
+def _mapped(column: Column, batch: Batch, clock: DeviceClock) -> Column:
+    """Return messages with stamps of the host's time; of all channels together, in the order of their receipt."""
+    pairs = zip(column.stamps.tolist(), batch.received[column.places].tolist(), strict=True)
+    stamps = [stamp if stamp == UNREADABLE else clock.host_time(stamp, received) for stamp, received in pairs]
+    return column._replace(stamps=np.array(stamps, dtype=np.int64))
 
 
 def _combined(columns: Sequence[Column]) -> Column:

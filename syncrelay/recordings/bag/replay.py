@@ -6,7 +6,7 @@ from typing import Any, Final, TypeAlias
 
 from syncrelay.explain import UNREADABLE, EngineDriver
 from syncrelay.recordings.bag.bindings import GroupBinding
-from syncrelay.recordings.bag.columns import Batch, Columns, ReadColumn, column_readers
+from syncrelay.recordings.bag.columns import Batch, Columns, ReadColumn, column_reader
 from syncrelay.recordings.bag.recording import Channel, RawMessage, Recording
 from syncrelay.sync import InputCounts, Message, Outcome
 
@@ -42,7 +42,7 @@ class GroupReplay:
     def readers(self) -> Iterator[list[tuple[Channel, ReadColumn]]]:
         """Yield the readers of each input's channels; raises BagError for a stamp or key that a type does not have."""
         for index, each in enumerate(self.binding.inputs):
-            yield column_readers(self.binding.group, index, each.channels)
+            yield [(channel, column_reader(self.binding.group, index, channel)) for channel in each.channels]
 
     def result(self) -> GroupResult:
         """Return the counts so far."""
@@ -66,7 +66,10 @@ class Replay:
         """Raises BagError for a stamp or key that a recorded type does not have."""
         self._recording = recording
         self._groups = [GroupReplay(binding, listeners) for binding in bindings]
-        self._columns = Columns([readers for group in self._groups for readers in group.readers()])
+        self._columns = Columns(
+            [readers for group in self._groups for readers in group.readers()],
+            [topic.device_clock() for binding in bindings for topic in binding.group.topics],
+        )
         # A set whose deadline has passed leaves before a later message is fed to any group.
         self._waiting = [group.driver for group in self._groups if group.driver.has_deadlines]
         self._inputs = [(group.driver, index) for group in self._groups for index in range(len(group.binding.inputs))]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from syncrelay.cdr import patch_stamp
 from syncrelay.config.names_in_graph import MANIFEST_TYPE, manifest_topic
 from syncrelay.config.profile import Profile, matched
-from syncrelay.dataflow.manifest import MANIFEST_DEPTH, ManifestWriter, Note
+from syncrelay.dataflow.manifest import MANIFEST_DEPTH, ManifestWriter, Note, header_stamp
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag.bindings import GroupBinding, Input
 from syncrelay.recordings.bag.definitions import as_ros2, begins_with_header, converter, jazzy_definition
@@ -16,10 +16,10 @@ from syncrelay.sync import Match, Message, Outcome
 
 
 class Outgoing(NamedTuple):
-    """How a recorded payload and the common stamp of a set become an output, and whether it has that stamp."""
+    """How a recorded payload and the common stamp of a set become an output, and whether it has a header for that."""
 
     written: Callable[[bytes, int | None], bytes]
-    is_restamped: bool
+    has_header: bool
 
 
 class _Manifest(NamedTuple):
@@ -72,9 +72,11 @@ class SetWriter:
         """Write a message; return its stamp as it leaves, when it was received, and its number among its topic's."""
         channel, received, payload = message.payload
         output, payload_of = self._outputs[each.output], self._payloads[each.output, channel]
-        self._recording.write(output, payload_of.written(payload, stamp), now)
+        content = payload_of.written(payload, stamp)
+        self._recording.write(output, content, now)
         self.messages += 1
-        leaves_as = stamp if stamp is not None and payload_of.is_restamped else message.stamp
+        is_as_matched = not payload_of.has_header or (stamp is None and each.config.is_by_header)
+        leaves_as = message.stamp if is_as_matched else header_stamp(content)
         return leaves_as, received, output.count
 
     def _manifest(self, binding: GroupBinding) -> "_Manifest":
@@ -99,14 +101,14 @@ def outgoing(each: Input, channel: Channel) -> Outgoing:
     The function raises BagError for a message that does not fit its definition.
     """
     convert = converter(channel) if channel.encoding is Encoding.ROS1 else None
-    has_header = begins_with_header(channel)
+    is_known = begins_with_header(channel)
     # If the type is unknown, the file's `stamp` decides.
-    restamped = each.config.stamp == "header" if has_header is None else has_header
+    has_header = each.config.stamp == "header" if is_known is None else is_known
 
     def payload_of(recorded: bytes, stamp: int | None) -> bytes:
         payload = recorded if convert is None else convert(recorded)
         if payload is None:
             raise BagError(f"{channel.topic}: a message does not fit the definition of {channel.type} in the bag")
-        return payload if stamp is None or not restamped else patch_stamp(payload, stamp)
+        return payload if stamp is None or not has_header else patch_stamp(payload, stamp)
 
-    return Outgoing(payload_of, restamped)
+    return Outgoing(payload_of, has_header)

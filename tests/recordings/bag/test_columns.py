@@ -2,7 +2,6 @@
 
 import json
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,7 +11,7 @@ from syncrelay.config import load_text
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.explain import UNREADABLE
 from syncrelay.recordings.bag import Channel, Encoding
-from syncrelay.recordings.bag.columns import Batch, cdr_stamps, column_readers, ros1_stamps
+from syncrelay.recordings.bag.columns import Batch, Columns, cdr_stamps, column_reader, ros1_stamps
 from syncrelay.recordings.bag.payloads import read_ros1_stamp
 from syncrelay.recordings.bag.recording import filled
 from tests.ros.cdr_messages import vector
@@ -56,23 +55,26 @@ def test_stamps_of_a_device_are_mapped_as_they_are_live(caplog):
     topics = [{"topic": "/a", "type": _VECTOR, "clock": "device", "delay": "8ms"}, {"topic": "/b", "type": _VECTOR}]
     group = {"policy": "approximate_time", "slop": "20ms", "topics": topics}
     relay = GroupRelay(load_text(json.dumps({"version": 1, "groups": {"front": group}})).groups[0], now=lambda: 0)
-    channel = Channel(0, "/a", _VECTOR, Encoding.CDR)
+    # Of two recorders, or of one that began again.
+    channels = [Channel(number, "/a", _VECTOR, Encoding.CDR) for number in range(2)]
     # Every 50 ms by a clock that began an hour ago; it begins anew after a minute.
     came = [(number * 50_000_000, number % 7 * 1_000_000) for number in range(2000)]
     rows = [
-        (channel, at + late + 10**18, vector(at + (3600 if at < 60 * 10**9 else 0) * 10**9, frame_id="a"))
-        for at, late in came
+        (channels[number % 2], at + late + 10**18, vector(at + (3600 * _SECOND if number < 1200 else 0), frame_id="a"))
+        for number, (at, late) in enumerate(came)
     ]
-    rows.append((channel, 2 * 10**18, b"\0\1\0\0"))
-    batches = [Batch(rows[:700]), Batch(rows[700:])]
-    ((_, read),) = column_readers(relay.config, 0, [channel])
-    recorded = [read(batch, np.arange(len(batch.rows)))[0].tolist() for batch in batches]
+    rows.append((channels[0], 2 * 10**18, b"\0\1\0\0"))
+    readers = [(each, column_reader(relay.config, 0, each)) for each in channels]
+    columns = Columns([readers], [relay.config.topics[0].device_clock()])
+    recorded = [stamp for part in (rows[:700], rows[700:]) for _, _, stamp, _ in columns.in_order(Batch(part))]
     clock = relay.clocks[0]
     assert clock is not None
     assert relay.clocks[1] is None
     live = [clock.host_time(stamp, at) for _, at, data in rows[:-1] if (stamp := read_stamp(data)) is not None]
-    assert [*recorded[0], *recorded[1]] == [*live, UNREADABLE]
+    assert recorded == [*live, UNREADABLE]
     assert all(abs(host - at - 10**18 + 8_000_000) < 7_000_000 for host, (at, _) in zip(live, came, strict=True))
-    assert [record.getMessage() for record in caplog.records] == [
-        "front: stamps of /a jumped back by 60 min: its clock was set or began anew, and is mapped anew from here"
-    ]
+    (record,) = caplog.records
+    assert record.getMessage() == (
+        "front: stamps of /a jumped back by 60 min against this machine's clock, and are mapped anew from here:"
+        " one of the two clocks was set, or the device started again"
+    )

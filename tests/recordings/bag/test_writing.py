@@ -113,6 +113,19 @@ def test_a_manifest_is_written_behind_the_messages_of_its_set(tmp_path):
         assert connection.digest == STORE.hash_rihs01(connection.msgtype)
 
 
+@pytest.mark.parametrize("key", [{"stamp": "receive"}, {"clock": "device"}])
+def test_a_manifest_tells_the_stamps_that_messages_leave_with_whatever_they_are_matched_by(key, tmp_path):
+    topics = [{"topic": topic, "type": VECTOR, **key} for topic in _PAIR]
+    bag = write_mcap(tmp_path / "rig.mcap", _RIG)
+    written = _written(bag, tmp_path / "out", manifest=True, topics=topics, slop="50s")
+    told = [read(payload) for payload in _payloads(written, "/syncrelay/front/sets")]
+    assert len(told) > 1
+    for index, topic in enumerate(_PAIR):
+        left = [stamp_of(payload) for payload in _payloads(written, f"/front{topic}")]
+        assert [each.inputs[index].stamp for each in told] == left
+        assert left != [each.inputs[index].original_stamp for each in told]
+
+
 def test_nothing_is_overwritten(tmp_path):
     bag = write_mcap(tmp_path / "rig.mcap", _RIG)
     with pytest.raises(OutputError, match=r"rig\.mcap: already exists and is not overwritten"):
