@@ -6,10 +6,10 @@ and the interpreter (`.@PYTHON=/path/to/python`); for a checkout also `coalesce=
 manifest has a subscriber), `scalars` (on /diagnostics), `tapped` (by `syncrelay tap`) and `untold` (it neither watches
 itself nor tells of it).
 
-Each is started once, between processes that publish and receive, and loaded in turns, for a second in each round, while
-the others are idle. CPU is what all threads of its process ran, by the scheduler's count, per message that came out.
-Rounds in which neighbours took over 5 % of the machine are dropped. It ends when the 95 % confidence interval of each
-ratio is narrower than --width, or after --rounds.
+Each is started once, between processes that publish and receive, and all are loaded at once, in rounds of a second. CPU
+is what all threads of its process ran, by the scheduler's count, per message that came out. Rounds in which neighbours
+took over 5 % of the machine are dropped. It ends when the 95 % confidence interval of each ratio is narrower than
+--width, or after --rounds.
 """
 
 import argparse
@@ -21,7 +21,7 @@ from pathlib import Path
 
 from candidates import LOADS, Workshop
 from intervals import Interval
-from rounds import in_turns, medians, ratios
+from rounds import medians, ratios, side_by_side
 from spent import PURPOSES
 
 
@@ -50,7 +50,7 @@ def main():
             except ValueError as error:
                 parser.error(str(error))
             print(f"{name}:", flush=True)
-            kept, n_rounds = in_turns(candidates, most=asked.rounds, width=asked.width)
+            kept, n_rounds = side_by_side(candidates, most=asked.rounds, width=asked.width)
             show(candidates, kept, n_rounds)
             costs = zip(candidates, ratios(kept, "cpu_us") if kept else (), strict=False)
             dear += [(name, each.name, cost) for each, cost in costs if asked.most and cost.is_above(asked.most)]

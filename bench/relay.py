@@ -13,7 +13,7 @@ from pathlib import Path
 
 from candidates import HERE, LOADS, Load, Workshop
 from compare import show
-from rounds import PATIENCE_S, free_domains, in_turns, processes
+from rounds import PATIENCE_S, free_domains, processes, side_by_side
 from spent import threads_ns
 
 SMALL = "2 x 200 Hz x 1 kB"
@@ -85,7 +85,7 @@ class Tables:
         print(f"{title}:", flush=True)
         show(
             [replace(each, name=each.name.replace(CHECKOUT, "syncrelay")) for each in candidates],
-            *in_turns(candidates, most=self._rounds),
+            *side_by_side(candidates, most=self._rounds),
         )
 
     def _start_and_idle(self, load, seconds):

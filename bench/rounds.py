@@ -1,4 +1,4 @@
-"""Starts candidates once, loads them in turns, and measures what a message costs each of them in each round."""
+"""Starts candidates once, loads them side by side, and measures what a message costs each of them in each round."""
 
 import contextlib
 import json
@@ -20,14 +20,13 @@ from spent import Instructions, by_purpose, threads_ns
 
 # Fifty processes may have to start on two cores.
 PATIENCE_S = 90.0
-# In a round each candidate is loaded so often for so long: what else runs here changes by the second, so what is
-# compared has to lie closer together.
-SLICES = 4
-SLICE_S = 0.25
-# What a relay runs without a load is seen once, for so long.
-IDLE_S = 3.0
+# A round takes so long. All are loaded at once, so that what else runs here disturbs all alike, and without a pause: a
+# relay does some of its work once a second, and more of it where messages come and go.
+ROUND_S = 1.0
 # By then each of fifty groups has been looked at since the last publisher or subscriber came.
 WARM_UP_S = 5.0
+# Until then the first seconds, which cost more, have left what a relay remembers.
+SETTLING_ROUNDS = 5
 MIN_ROUNDS = 10
 
 
@@ -100,58 +99,40 @@ class Station:
         # From when it is ready.
         self._instructions: Any = None
         self._before: Any = None
-        self._idle_share: Any = Counter()
-        self._loaded_ran: Counter = Counter()
-        self._loaded_ns, self._slices = 0, []
 
     def wait_ready(self):
         for child in (self._publisher, self._receiver):
             child.read(PATIENCE_S)
         self._start_tap()
 
-    def note_idle(self):
-        """Note what the threads run by themselves, and count instructions from now on."""
+    def count_instructions(self):
+        """Count the instructions of the threads that the relay has now."""
         self._instructions = Instructions(self.relay.process.pid)
-        before = self._ran()
-        time.sleep(IDLE_S)
-        self._idle_share = {thread: ns / IDLE_S / 1e9 for thread, ns in (self._ran() - before).items()}
 
     def begin(self):
-        self._before = time.monotonic_ns(), self._ran(), self._instructions.read()
-        self._loaded_ns, self._loaded_ran, self._slices = 0, Counter(), []
-
-    def load_for(self, seconds):
-        """Load the relay until all that it was sent came out, or is lost; raises RuntimeError where a process fails."""
-        began, before = time.monotonic_ns(), self._ran()
-        n_sets = max(1, round(self._load.rate * seconds))
-        due = n_sets * len(self._load.outputs)
-        self._receiver.tell(json.dumps([time.time_ns(), due]))
+        """Load the relay for a round."""
+        self._before = self._ran(), self._instructions.read()
+        n_sets = max(1, round(self._load.rate * ROUND_S))
+        self._receiver.tell(json.dumps([time.time_ns(), n_sets * len(self._load.outputs)]))
         self._publisher.tell(n_sets)
-        self._publisher.read(PATIENCE_S)
-        came, latency_ns = json.loads(self._receiver.read(PATIENCE_S))
-        self._loaded_ns += time.monotonic_ns() - began
-        self._loaded_ran += self._ran() - before
-        self._slices.append((due, came, latency_ns))
 
     def end(self):
-        """Return what a message cost since the beginning.
+        """Return what a message cost in this round, once all that was sent came out, or is lost.
 
-        What the relay ran while others were loaded counts where it is more than it runs by itself: a relay may do
-        later, once a second, what a message has asked for.
+        Raises RuntimeError where a process fails.
         """
-        began, before, instructions = self._before
-        ran, rested_ns = self._ran() - before, time.monotonic_ns() - began - self._loaded_ns
-        due, came, _ = map(sum, zip(*self._slices, strict=True))
+        self._publisher.read(PATIENCE_S)
+        came, latency_ns = json.loads(self._receiver.read(PATIENCE_S))
+        ran, instructions = self._ran() - self._before[0], self._instructions.read() - self._before[1]
+        due = max(1, round(self._load.rate * ROUND_S)) * len(self._load.outputs)
         if came == 0:
             raise RuntimeError(f"{self.relay.process.args} relayed nothing")
-        idle = Counter({thread: int(share * rested_ns) for thread, share in self._idle_share.items()})
-        ran = self._loaded_ran + (ran - self._loaded_ran - idle)
         return Turn(
             {purpose: ns / came / 1e3 for purpose, ns in by_purpose(ran, self.relay.process.pid).items()},
             ran.total() / came / 1e3,
-            statistics.median(latency_ns for *_, latency_ns in self._slices) / 1e6,
+            latency_ns / 1e6,
             1 - came / due,
-            (self._instructions.read() - instructions) / came,
+            instructions / came,
         )
 
     def _ran(self):
@@ -194,8 +175,8 @@ def free_domains():
     return iter(free)
 
 
-def in_turns(candidates, *, most=200, width=0.05):
-    """Load the candidates in turns until the interval of each ratio to the first is narrow, or for `most` rounds.
+def side_by_side(candidates, *, most=200, width=0.05):
+    """Load the candidates until the interval of each ratio to the first is narrow, or for `most` rounds.
 
     Returns the rounds that nothing disturbed, and how many there were; Ctrl-C ends it early.
     """
@@ -207,8 +188,9 @@ def in_turns(candidates, *, most=200, width=0.05):
             station.wait_ready()
         time.sleep(WARM_UP_S)
         for station in started:
-            station.load_for(2 * SLICE_S)
-            station.note_idle()
+            station.count_instructions()
+        for _ in range(SETTLING_ROUNDS):
+            one_round(started)
         while len(rounds) < most:
             rounds.append(one_round(started))
             kept = undisturbed(rounds)
@@ -221,11 +203,8 @@ def one_round(started):
     machine = machine_time()
     for station in started:
         station.begin()
-    for number in range(SLICES):
-        # There and back, so that none is always behind the same one.
-        for station in started[:: -1 if number % 2 else 1]:
-            station.load_for(SLICE_S)
-    return Round([station.end() for station in started], stolen_share(machine, machine_time()))
+    turns = [station.end() for station in started]
+    return Round(turns, stolen_share(machine, machine_time()))
 
 
 def ratios(rounds, what):
