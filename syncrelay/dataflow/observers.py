@@ -164,14 +164,14 @@ class _Publisher:
 
     def sender(self) -> Sender:
         """Give it as a value."""
-        lately = self._lately
+        sent, delivered, gaps, ways = zip(*self._lately, strict=True)
         return Sender(
             self.node,
-            sent=sum(each.sent for each in lately),
-            delivered=sum(each.delivered for each in lately),
-            longest_gap=max((each.longest_gap for each in lately), default=0),
+            sent=sum(sent),
+            delivered=sum(delivered),
+            longest_gap=max(gaps),
             sent_hz=self._rate,
-            way=min((each.way for each in lately if each.way is not None), default=None),
+            way=min((each for each in ways if each is not None), default=None),
             sent_in_all=self.sent,
             delivered_in_all=self.delivered,
         )

@@ -5,7 +5,7 @@ change; a wrong one leaves a saw-tooth or a slope that no clock has.
 """
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from operator import sub
 from statistics import median
 from typing import Final, NamedTuple
@@ -104,12 +104,13 @@ def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
 
     All are in nanoseconds, in the order of receipt.
     """
-    last = _newest(stamps, delays)
-    if len(last) < _SHOW_A_UNIT or last[-1][1] - last[0][1] < _WATCHED:
-        return None
-    scatter = _scatter(last, lambda stamp: stamp)
+    newest = _newest(stamps, delays)
+    scatter = _scatter(delays[newest])
     # Coarse stamps scatter by as much as they are rounded.
-    if scatter < max(_LEAST_SCATTER, 2 * resolution(stamps)):
+    if scatter < _LEAST_SCATTER or scatter < 2 * resolution(stamps):
+        return None
+    last = [(stamp, stamp + delay) for stamp, delay in zip(stamps[newest], delays[newest], strict=True)]
+    if len(last) < _SHOW_A_UNIT or last[-1][1] - last[0][1] < _WATCHED:
         return None
     return _of_parts(last, scatter) or _of_rate(last, scatter)
 
@@ -120,17 +121,18 @@ def resolution(stamps: Sequence[int]) -> int:
     0 too of a sensor that is as regular as that: its stamps may have been rounded, or not.
     """
     last = stamps[-_ENOUGH:]
-    periods = Counter(map(sub, last[1:], last))
-    if len(last) < _FEWEST or max(periods.values()) > _REGULAR * len(last):
+    unit = next((unit for unit in _RESOLUTIONS if not any(stamp % unit for stamp in last)), 0)
+    if not unit or len(last) < _FEWEST:
         return 0
-    return next((unit for unit in _RESOLUTIONS if not any(stamp % unit for stamp in last)), 0)
+    periods = Counter(period for period in map(sub, last[1:], last) if period)
+    return unit if max(periods.values(), default=0) <= _REGULAR * len(last) else 0
 
 
 def _of_parts(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:
     """Return a reading by which the field nanosec is of another unit."""
     for part in _PARTS if len(last) >= _FEWEST else ():
         if all(stamp % _SECOND < _SECOND // part.nanoseconds for stamp, _ in last):
-            whole = _scatter(last, lambda stamp, part=part: _spread_out(stamp, part))  # type: ignore[misc]
+            whole = _scatter([received - _spread_out(stamp, part) for stamp, received in last])
             if whole <= _BETTER * scatter:
                 return Reading(part.what, is_unit=True, strayed=scatter)
     return None
@@ -141,7 +143,7 @@ def _of_rate(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:
     rate, first = _rate(last), last[0][0]
     if rate <= 0 or abs(rate - 1) <= MOST_RATE:
         return None
-    if _scatter(last, lambda stamp: round((stamp - first) / rate)) > _BETTER * scatter:
+    if _scatter([received - round((stamp - first) / rate) for stamp, received in last]) > _BETTER * scatter:
         return None
     for unit in _UNITS:
         if abs(rate / unit.rate - 1) < _CLOSE:
@@ -152,23 +154,25 @@ def _of_rate(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:
     return Reading(f"{_FROM_BOOT}, and {runs}" if 0 <= last[-1][0] < BOOT_NS else runs, rate, strayed=scatter)
 
 
-def _newest(stamps: Sequence[int], delays: Sequence[int]) -> list[tuple[int, int]]:
-    """Return stamps and times of receipt of some of the newest messages."""
-    count = min(len(stamps), len(delays))
+def _newest(stamps: Sequence[int], delays: Sequence[int]) -> slice:
+    """Return which of the newest messages are read."""
+    count = len(stamps)
     if not count:
-        return []
+        return slice(0)
     end = stamps[-1] + delays[-1]
     first = max(0, count - _FEWEST)
     step = max(1, count // _ENOUGH)
     while first > 0 and end - (stamps[first - 1] + delays[first - 1]) <= _LATELY:
         first = max(0, first - step)
     step = max(1, (count - first) // _ENOUGH)
-    return [(stamps[at], stamps[at] + delays[at]) for at in range(count - 1, first - 1, -step)][::-1]
+    return slice(first + (count - 1 - first) % step, count, step)
 
 
-def _scatter(pairs: Sequence[tuple[int, int]], read: Callable[[int], int]) -> int:
-    delays = sorted(received - read(stamp) for stamp, received in pairs)
-    low, high = (delays[round(share * (len(delays) - 1))] for share in _MIDDLE)
+def _scatter(delays: Sequence[int]) -> int:
+    if not delays:
+        return 0
+    ordered = sorted(delays)
+    low, high = (ordered[round(share * (len(ordered) - 1))] for share in _MIDDLE)
     return high - low
 
 

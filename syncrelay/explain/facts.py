@@ -357,7 +357,8 @@ class GroupFacts:
     @property
     def is_silent(self) -> bool:
         """Whether sets that should have come did not."""
-        return not self._is_resting and self.silent_for >= self.silent_after
+        # The first of these is the usual answer, and the cheapest.
+        return self.silent_for >= _NO_SETS and self.silent_for >= self.silent_after and not self._is_resting
 
     @property
     def _is_resting(self) -> bool:
@@ -366,6 +367,8 @@ class GroupFacts:
     @property
     def has_stopped(self) -> bool:
         """Whether a few sets in a row that should have come did not. What it takes longer to be sure of is silence."""
+        if self.silent_for < _STOPPED:
+            return False
         if self.is_silent:
             return True
         required = [each.figures for each in self.inputs if each.required]

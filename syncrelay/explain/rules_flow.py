@@ -62,15 +62,17 @@ def _overlap(held_up: Sequence[Sequence[tuple[int, int]]]) -> bool:
 def messages_lost(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find messages that were published and did not come here: by their numbers, or else as DDS reports it."""
     graph, share = an_input.graph, facts.figures.share
+    losing = [each for each in graph.senders if each.lost]
+    if not losing and not graph.undelivered:
+        return
     # Each cost a set at most: they are the cause where they account for most of those that are missing.
     missing, cost = share.possible - share.left, sum(each.graph.undelivered for each in facts.inputs if each.required)
     explains = an_input.required and 0 < missing <= 2 * cost
-    losing = [each for each in graph.senders if each.lost]
     if losing:
         lost = " and ".join(f"{each.lost} of {each.sent} messages from {each.node}" for each in losing)
         why, cure = _why_lost(graph, losing)
         yield Fault(f"{lost} did not arrive on {an_input.name} in the last 10 s: {why}", cure, explains=explains)
-    elif graph.undelivered:
+    else:
         messages = "1 message" if graph.lost == 1 else f"{graph.lost} messages"
         yield Fault(
             f"DDS lost {messages} of {an_input.name} on the way here in the last 10 s",
