@@ -1,9 +1,10 @@
 """The line under the delays of messages: what a clock does, below what the way to us adds.
 
-A delay is the least that there is plus a jitter that is never negative. So no point lies under the true line, and what
-is nearest to it tells most (Olson, "A Passive Solution to the Sensor Synchronization Problem", 2010). Of all lines with
-no point below, this takes the likeliest for jitter that is distributed exponentially and for a rate near the one that
-is expected: an edge of the lower convex hull, or a line of the expected rate that touches it.
+A delay is the least that there is plus a jitter that is hardly ever negative. So no point lies under the true line but
+a few whose stamp was late, and what is nearest to it tells most (Olson, "A Passive Solution to the Sensor
+Synchronization Problem", 2010). Of all lines with no other point below, this takes the likeliest for jitter that is
+distributed exponentially and for a rate near the one that is expected: an edge of the lower convex hull, or a line of
+the expected rate that touches it.
 """
 
 from bisect import bisect_left
@@ -22,6 +23,11 @@ _SHARE_OF_JITTER: Final = 0.05
 _LEAST_MOVED: Final = 1e-4
 LEAST_JITTER: Final = 2e-5
 """What takes less is below what systems tell of times."""
+# Stamps may be late, too. A point says nothing of the line if it lies farther below the next one than so many times
+# what the next ones are apart, which are so many; of all points, at most so many do.
+_ALONE: Final = 4.0
+_NEAR: Final = 30
+_OUTLIERS: Final = 0.05
 # Oscillators are mostly within so much of true time. One that was watched for so long keeps its rate within so much.
 _USUAL_RATE: Final = 100e-6
 _KNOWN_AFTER: Final = 20.0
@@ -63,27 +69,34 @@ class Envelope:
 
     def add(self, x: float, y: float, jitter: float) -> None:
         """Take a point, and how far points usually lie above the line."""
-        self.level += min(0.0, self.height(x, y))
-        self._count += 1
-        if self._count == 1 or y - self.rate * x < self._lowest[1] - self.rate * self._lowest[0]:
-            self._lowest = x, y
-        if x >= self._until:
+        if x >= self._until and self._count:
             self._points.append((*self._lowest, self._count))
             self._count, self._until = 0, x + _WIDTH
             self._fit(x, max(jitter, LEAST_JITTER))
+        if len(self._points) * _OUTLIERS < 1:
+            self.level += min(0.0, self.height(x, y))
+        self._count += 1
+        if self._count == 1 or y - self.rate * x < self._lowest[1] - self.rate * self._lowest[0]:
+            self._lowest = x, y
 
     def _fit(self, now: float, jitter: float) -> None:
         if len(self._points) > _MOST:
             self._join_oldest()
-        while self._points[0][0] < now - _LONGEST:
+        while self._points and self._points[0][0] < now - _LONGEST:
             self._points.popleft()
         oldest = now - sqrt(2 * max(_SHARE_OF_JITTER * jitter, _LEAST_MOVED) / _WANDER)
+        points = [point for point in self._points if point[0] >= oldest]
+        if not points:
+            # The device was away for so long that its clock is known by its rate alone.
+            return
+        heights = sorted([y - self.rate * x for x, y, _ in points])
+        first = _first_of_many(heights)
         hull: list[tuple[float, float]] = []
         count, total = 0, 0.0
-        for x, y, n in self._points:
-            if x < oldest:
-                continue
+        for x, y, n in points:
             count, total = count + n, total + n * x
+            if y - self.rate * x < heights[first]:
+                continue
             while len(hull) > 1 and _is_above(hull[-1], hull[-2], (x, y)):
                 hull.pop()
             hull.append((x, y))
@@ -101,6 +114,21 @@ class Envelope:
             low = min(one, other, key=lambda point: point[1] - self.rate * point[0])
             joined.append((low[0], low[1], one[2] + other[2]))
         self._points = deque(joined + points[half:])
+
+
+def _first_of_many(heights: list[float]) -> int:
+    """Return which of these heights, sorted, is the least that others are near: less had a stamp that was late."""
+    first = 0
+    for place in range(int(_OUTLIERS * len(heights))):
+        if heights[place + 1] - heights[place] > _ALONE * _spacing(heights, place + 1):
+            first = place + 1
+    return first
+
+
+def _spacing(heights: list[float], first: int) -> float:
+    """Return how far apart the least heights are, from one of them on."""
+    last = min(first + _NEAR, len(heights) - 1)
+    return (heights[last] - heights[first]) / (last - first) if last > first else 0.0
 
 
 def _is_above(point: tuple[float, float], before: tuple[float, float], after: tuple[float, float]) -> bool:
