@@ -25,8 +25,8 @@ PATIENCE_S = 90.0
 ROUND_S = 1.0
 # By then each of fifty groups has been looked at since the last publisher or subscriber came.
 WARM_UP_S = 5.0
-# Until then the first seconds, which cost more, have left what a relay remembers.
-SETTLING_ROUNDS = 5
+# By then the windows of a relay's figures are full.
+SETTLING_ROUNDS = 10
 MIN_ROUNDS = 10
 
 
@@ -99,6 +99,7 @@ class Station:
         # From when it is ready.
         self._instructions: Any = None
         self._before: Any = None
+        self._due = 0
 
     def wait_ready(self):
         for child in (self._publisher, self._receiver):
@@ -111,9 +112,10 @@ class Station:
 
     def begin(self):
         """Load the relay for a round."""
-        self._before = self._ran(), self._instructions.read()
         n_sets = max(1, round(self._load.rate * ROUND_S))
-        self._receiver.tell(json.dumps([time.time_ns(), n_sets * len(self._load.outputs)]))
+        self._due = n_sets * len(self._load.outputs)
+        self._before = self._ran(), self._instructions.read()
+        self._receiver.tell(json.dumps([time.time_ns(), self._due]))
         self._publisher.tell(n_sets)
 
     def end(self):
@@ -124,14 +126,13 @@ class Station:
         self._publisher.read(PATIENCE_S)
         came, latency_ns = json.loads(self._receiver.read(PATIENCE_S))
         ran, instructions = self._ran() - self._before[0], self._instructions.read() - self._before[1]
-        due = max(1, round(self._load.rate * ROUND_S)) * len(self._load.outputs)
         if came == 0:
             raise RuntimeError(f"{self.relay.process.args} relayed nothing")
         return Turn(
             {purpose: ns / came / 1e3 for purpose, ns in by_purpose(ran, self.relay.process.pid).items()},
             ran.total() / came / 1e3,
             latency_ns / 1e6,
-            1 - came / due,
+            1 - came / self._due,
             instructions / came,
         )
 

@@ -73,6 +73,7 @@ class Envelope:
             self._points.append((*self._lowest, self._count))
             self._count, self._until = 0, x + _WIDTH
             self._fit(x, max(jitter, LEAST_JITTER))
+        # Of so few points none is taken for an outlier: the line falls at once, as it does in the first seconds.
         if len(self._points) * _OUTLIERS < 1:
             self.level += min(0.0, self.height(x, y))
         self._count += 1

@@ -118,14 +118,14 @@ def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
 def resolution(stamps: Sequence[int]) -> int:
     """Return of which unit all the last stamps are multiples, in nanoseconds: 1 s, 100 or 10 ms; 0 of none of these.
 
-    0 too of a sensor that is as regular as that: its stamps may have been rounded, or not.
+    0 too of a sensor that is as regular as that, whose stamps may have been rounded or not, and of one stamp alone.
     """
     last = stamps[-_ENOUGH:]
     unit = next((unit for unit in _RESOLUTIONS if not any(stamp % unit for stamp in last)), 0)
     if not unit or len(last) < _FEWEST:
         return 0
     periods = Counter(period for period in map(sub, last[1:], last) if period)
-    return unit if max(periods.values(), default=0) <= _REGULAR * len(last) else 0
+    return unit if 0 < max(periods.values(), default=0) <= _REGULAR * len(last) else 0
 
 
 def _of_parts(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:

@@ -1,7 +1,7 @@
 """Stamps of a device are mapped to the host's time: as near as its jitter allows, whatever its clock does."""
 
 import random
-from statistics import fmean, median, pstdev
+from statistics import fmean
 
 import pytest
 from hypothesis import given
@@ -14,7 +14,6 @@ from tests.faults.extent import chosen
 
 TRACES = chosen(short=2, long=200)
 RIGS = chosen(short=12, long=10_000)
-NOISES = chosen(short=3, long=300)
 SEED = chosen(short=1, long=random.randrange(10**9))
 NOW = 1_700_000_000 * SECOND
 
@@ -106,23 +105,16 @@ def test_a_device_that_was_away_is_mapped_on(away_s):
         assert abs(host - now) < SECOND // 1000
 
 
-@pytest.mark.hypothesis
-def test_stamps_that_are_early_and_late_scatter_no_more_than_times_of_receipt():
-    ratios = []
-    for number in range(NOISES):
-        chance = random.Random(f"{SEED} {number}")
-        rate, jitter, hz = chance.uniform(-200e-6, 200e-6), chance.uniform(0.5e-3, 5e-3), chance.choice([10, 30, 100])
-        moments = [number / hz for number in range(90 * hz)]
-        came = sorted((at + 0.03 + max(-0.029, chance.gauss(0, jitter)), at) for at in moments)
-        clock, mapped, received = DeviceClock(), [], []
-        for come, at in came:
-            host = clock.host_time(NOW + round(at * (1 + rate) * SECOND), NOW + round(come * SECOND))
-            if at > 30:
-                mapped.append(host - NOW - at * SECOND)
-                received.append((come - at) * SECOND)
-        ratios.append(pstdev(mapped) / pstdev(received))
-    assert median(ratios) < 0.5, SEED
-    assert sum(ratio > 1 for ratio in ratios) <= NOISES // 100, SEED
+@pytest.mark.parametrize("number", range(3))
+def test_a_stamp_now_and_then_that_is_late_moves_no_other(number):
+    chance, clock, mapped = random.Random(f"{SEED} late {number}"), DeviceClock(), []
+    for at in (each / 30 for each in range(3000)):
+        late = chance.uniform(0.5e-3, 2e-3) if chance.random() < 0.002 else 0
+        stamp = NOW + round((at * (1 + 50e-6) + late) * SECOND)
+        host = clock.host_time(stamp, NOW + round((at + 0.02 + chance.expovariate(1000)) * SECOND))
+        if at > 30 and not late:
+            mapped.append(abs(host - NOW - (at + 0.02) * SECOND) < SECOND // 2000)
+    assert fmean(mapped) > 0.95, SEED
 
 
 @pytest.mark.parametrize("by_s", [-3600, -2, 2, 3600])
