@@ -7,7 +7,6 @@ from syncrelay.clock import Step
 from syncrelay.config import Tolerance
 from syncrelay.config.profile import Mismatch
 from syncrelay.explain.cause_log import CauseLog
-from syncrelay.explain.clocks import STEP_NS
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import BOUNDS_NS, Distribution, Histogram
 from syncrelay.explain.dry_run import UNREADABLE, EngineDriver
@@ -33,6 +32,7 @@ from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet
 from syncrelay.explain.rules_graph import no_other_node
 from syncrelay.explain.standing import NO_SET_MISSED, Share, Standing
+from syncrelay.explain.steps import STEP_NS
 from syncrelay.explain.tape import Left, Stamps, Tape
 from syncrelay.explain.try_budget import TryBudget
 from syncrelay.explain.unneeded import FOR_WANT_OF_A_PARTNER, DropFates, drop_fates, may_set_pace

@@ -1,14 +1,10 @@
-"""What stamps tell of a clock: how fast it runs against the time of receipt, and whether it was set."""
+"""What stamps tell of a clock: how fast it runs against the time of receipt."""
 
-from collections import deque
-from collections.abc import Callable, Sequence
-from itertools import islice
+from collections.abc import Sequence
 from math import hypot, sqrt
 from operator import mul, sub
-from statistics import fmean, median, median_low
-from typing import Final, NamedTuple
-
-from syncrelay.clock import Step
+from statistics import fmean, median
+from typing import NamedTuple
 
 _FEWEST = 5
 _PARTS = 4
@@ -17,7 +13,6 @@ _MORE_OF_FEW = 8
 # A point this many times as far off the line as the median point was held up on its way.
 _HELD_UP = 6
 _LEAST_HELD_UP = 1_000_000
-_SECOND: Final = 1_000_000_000
 
 
 class Drift(NamedTuple):
@@ -87,104 +82,3 @@ def apart(one: Drift, other: Drift) -> Drift:
     watched = min(one.watched_ns, other.watched_ns)
     error, points = hypot(one.error, other.error), min(one.points, other.points)
     return Drift(one.slope - other.slope, one.bend_ns + other.bend_ns, watched, error, points)
-
-
-STEP_NS: Final = 500_000_000
-"""What is less may be a delay."""
-# A message that was held up arrives late; setting a clock takes no time.
-_SOON: Final = 0.5
-_SOON_PERIODS: Final = 1.5
-# Messages that were held up and then came at once have stamps a period apart.
-_LAY_PERIODS: Final = 3
-# Two clocks in turn: the step back is as large, and comes within this time.
-_COMES_BACK: Final = 5 * _SECOND
-_ALIKE: Final = 0.25
-# A step is lasting if the delays of this many polls confirm it.
-_LEVELS: Final = 3
-# Late messages that are in time again have the delay of before: that of the polls of the last minute.
-_USUAL: Final = 60
-# A live clock is this close to the machine's after the step. A looped recording is not.
-_LIVE: Final = 10 * _SECOND
-_WINDOW: Final = 10 * _SECOND
-_TOLD: Final = 30 * _SECOND
-
-
-class StampSteps:
-    """Watches one input's messages for steps."""
-
-    def __init__(self) -> None:
-        self._newest: tuple[int, int] | None = None
-        self._pending: tuple[Step, int] | None = None
-        self._levels: list[int] = []
-        self._usual: deque[int] = deque(maxlen=_USUAL)
-        self._stayed: Step | None = None
-        self._swings: deque[Step] = deque(maxlen=100)
-
-    def forget(self) -> None:
-        """Start afresh: this machine's clock was set."""
-        self._newest = self._pending = self._stayed = None
-        self._swings.clear()
-        self._usual.clear()
-
-    def add(
-        self, received: Sequence[int], delays: Sequence[int], least: int, most: int, *, period: Callable[[], float]
-    ) -> None:
-        """Take when messages came, their delays, and the least and the most of those.
-
-        `period` gives the usual time between two, when it is needed.
-        """
-        newest, self._newest = self._newest, (received[-1], delays[-1])
-        if newest is not None and max(most, newest[1]) - min(least, newest[1]) >= STEP_NS:
-            self._scan(newest, received, delays, period())
-        self._usual.append(least)
-        if self._pending is not None:
-            self._levels.append(least)
-            if len(self._levels) > _LEVELS:
-                self._conclude()
-
-    def last(self, now: int) -> Step | None:
-        """Return the last step that stayed, for half a minute."""
-        step = self._stayed
-        return step if step is not None and 0 <= now - step.at < _TOLD else None
-
-    def swings(self, now: int) -> tuple[int, int]:
-        """Return how often stamps stepped there and back in the last 10 s, and by how much."""
-        lately = [abs(step.by) for step in self._swings if 0 <= now - step.at < _WINDOW]
-        return len(lately), median_low(lately) if lately else 0
-
-    def _scan(self, newest: tuple[int, int], received: Sequence[int], delays: Sequence[int], period: float) -> None:
-        before, delay_before = newest
-        for at, delay in zip(received, delays, strict=True):
-            by, took = delay_before - delay, at - before
-            before, delay_before = at, delay
-            if abs(by) < STEP_NS or took > max(_SOON * abs(by), _SOON_PERIODS * period):
-                continue
-            if by < 0 or by > _LAY_PERIODS * period:
-                self._note(Step(at, by), delay)
-
-    def _note(self, step: Step, delay: int) -> None:
-        if self._pending is not None:
-            before = self._pending[0]
-            if step.at - before.at < _COMES_BACK and _is_alike(-step.by, before.by):
-                self._swings.append(step)
-        self._pending = step, delay
-        self._levels.clear()
-
-    def _conclude(self) -> None:
-        if self._pending is None:
-            return
-        (step, delay), self._pending = self._pending, None
-        # What came with the step is of before it too.
-        level = median_low(self._levels[1:])
-        if abs(level) < _LIVE and _is_alike(level - delay - step.by, -step.by) and not self._is_back(step, level):
-            self._stayed = step
-
-    def _is_back(self, step: Step, level: int) -> bool:
-        """Whether messages that were late, though no clock had been set, come as they did before."""
-        was_set = self._stayed is not None and _is_alike(-step.by, self._stayed.by)
-        earlier = islice(self._usual, max(0, len(self._usual) - len(self._levels)))
-        return step.by > 0 and not was_set and any(abs(each - level) <= _ALIKE * step.by for each in earlier)
-
-
-def _is_alike(one: int, other: int) -> bool:
-    return abs(one - other) <= _ALIKE * abs(other)

@@ -43,6 +43,8 @@ _MIDDLE: Final = (0.1, 0.9)
 _RESOLUTIONS: Final = (_SECOND, _SECOND // 10, _SECOND // 100)
 # A slope that is this close to a power of 1,000 is one of a wrong unit.
 _CLOSE: Final = 0.05
+OTHER_RATE: Final = 1.5 * MOST_RATE
+"""What runs off by more than this does not drift: an oscillator may seem to be off by a little more than it is."""
 
 
 class Reading(NamedTuple):
@@ -141,7 +143,7 @@ def _of_parts(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:
 def _of_rate(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:
     """Return a reading by which stamps run faster or slower than time."""
     rate, first = _rate(last), last[0][0]
-    if rate <= 0 or abs(rate - 1) <= MOST_RATE:
+    if rate <= 0 or abs(rate - 1) <= OTHER_RATE:
         return None
     if _scatter([received - round((stamp - first) / rate) for stamp, received in last]) > _BETTER * scatter:
         return None
@@ -150,7 +152,7 @@ def _of_rate(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:
             return Reading(unit.what, unit.rate, is_unit=True, strayed=scatter)
     if len(last) < _FEWEST:
         return None
-    runs = f"run at {rate:.3g} times the speed of this machine's time"
+    runs = f"run at {rate:.4g} times the speed of this machine's time"
     return Reading(f"{_FROM_BOOT}, and {runs}" if 0 <= last[-1][0] < BOOT_NS else runs, rate, strayed=scatter)
 
 

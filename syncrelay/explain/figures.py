@@ -53,6 +53,8 @@ class InputFigures:
     """How many repeated a stamp."""
     out_of_order: int = 0
     """How many had an older stamp than the one before."""
+    faulty_looks: int = 2
+    """In how many looks there were such stamps: in one alone where a clock was set."""
     nearest: Distribution = NOTHING
     """Of an optional input: the spans of the tightest sets with it, whenever its messages came."""
     bursts: int = 0
@@ -66,7 +68,9 @@ class InputFigures:
     fell_at: int | None = None
     """When they did."""
     stepped: Step | None = None
-    """A lasting step of its stamps against the times of receipt in the last half minute."""
+    """The last lasting step of its stamps against the times of receipt."""
+    may_step: bool = False
+    """Whether its last stamps may have stepped, which is not known yet."""
     swings: int = 0
     """How often its stamps stepped there and back."""
     swung_by: int = 0

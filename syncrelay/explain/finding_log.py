@@ -8,7 +8,7 @@ from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import Finding
 from syncrelay.explain.judge import explanation
-from syncrelay.explain.rules_stamps import may_drift
+from syncrelay.explain.rules_drift import known_soon
 from syncrelay.explain.standing import Standing
 
 _SECOND: Final = 1_000_000_000
@@ -23,7 +23,6 @@ _UNTIL_TRIED: Final = 10 * _SECOND
 
 # Whoever pauses a relay gets an answer at once, so the log need not repeat it.
 _NOT_LOGGED: Final = frozenset({Code.PAUSED})
-_OF_DRIFT: Final = frozenset({Code.UNEXPLAINED, Code.OVER_SLOP, Code.CONSTANT_OFFSET, Code.FEW_SETS})
 
 
 class Remark(NamedTuple):
@@ -107,7 +106,7 @@ class FindingLog:
                 self._pause, self._log_again = 0, now
         if now < self._log_again:
             return
-        if finding.code in _OF_DRIFT and may_drift(facts) and now - self._log_again < _UNTIL_TRIED:
+        if known_soon(facts, finding.code) and now - self._log_again < _UNTIL_TRIED:
             # The cause may be known soon.
             return
         if _awaits_a_try(facts, finding) and now - self._log_again < _UNTIL_TRIED:
@@ -137,7 +136,7 @@ class FindingLog:
             warning.see(finding, now)
             # One missed set lowers the share for the length of the window.
             missing = facts.figures.share.ns if finding.code is Code.FEW_SETS else 0
-            may_be_known = finding.code in _OF_DRIFT and may_drift(facts)
+            may_be_known = known_soon(facts, finding.code)
             until_tried = _UNTIL_TRIED if may_be_known or _awaits_a_try(facts, finding) else 0
             if not warning.is_logged and now - warning.began >= _LASTING + missing + until_tried:
                 warning.is_logged = warning.holds = True

@@ -6,12 +6,13 @@ from operator import lt, sub
 from statistics import median
 from typing import Final, NamedTuple, TypeAlias
 
-from syncrelay.explain.clocks import Drift, StampSteps, drift
+from syncrelay.explain.clocks import Drift, drift
 from syncrelay.explain.distribution import Distribution, keep_last, no_values
 from syncrelay.explain.epochs import reading, resolution
 from syncrelay.explain.figures import InputFigures
 from syncrelay.explain.rhythm import AT_ONCE, LEAST_HELD_NS, Burst, PaceWatch, bursts, steady_period
 from syncrelay.explain.standing import Pace
+from syncrelay.explain.steps import StampSteps
 from syncrelay.sync.messages import DropReason
 
 Arrivals: TypeAlias = Sequence[tuple[int, int]]
@@ -95,7 +96,7 @@ class InputObservation:
         delays = list(map(sub, map(by_clock, received) if by_clock else received, stamps)) if stamped else []
         least, most = (min(delays), max(delays)) if delays else (0, 0)
         if delays:
-            self._steps.add(received, delays, least, most, period=lambda: _median_period(self._received))
+            self._follow_steps(received, delays, least, most)
         # Of two clocks in turn, each fall is followed by a rise: nothing begins anew.
         if fallen and not self._steps.swings(last)[0]:
             self._forget()
@@ -112,12 +113,21 @@ class InputObservation:
             self._measure(stamped, delays, least, most)
         return fallen
 
+    def _follow_steps(self, received: Sequence[int], delays: Sequence[int], least: int, most: int) -> None:
+        """Look whether the clock was set. What was stamped before tells nothing of it now."""
+        at = self._steps.add(received, delays, least, most, period=lambda: _median_period(self._received))
+        if at is not None:
+            old = sum(stamp + delay < at for stamp, delay in zip(self._stamps, self._delays, strict=True))
+            del self._stamps[:old], self._delays[:old]
+            self._forget_drift()
+
     def _observe_pace(self, times: Sequence[int]) -> None:
         before = self._pace.slowed_from
         self._pace.observe(times)
         if before != self._pace.slowed_from:
-            # The least delay of fewer messages is greater: that is no drift.
+            # The least delay of fewer messages is greater: that is no drift, and no step.
             self._forget_drift()
+            self._steps.forget_levels()
 
     def forget_publishers(self) -> None:
         """Bear that others publish now than did: their rate and their clocks are not those of before."""
@@ -130,6 +140,7 @@ class InputObservation:
         """Bear that the messages from now on may be stamped by another clock, or come another way."""
         del self._stamps[:], self._delays[:]
         self._forget_drift()
+        self._steps.forget_levels()
 
     def _forget_drift(self) -> None:
         self._points.clear()
@@ -158,11 +169,7 @@ class InputObservation:
         """Give the figures; counts are those of the window, which is so many seconds long."""
         fell_by, fell_at = self._fell or (None, None)
         rate_hz, usual_hz = self._rates(fed, seconds, now)
-        duplicates = out_of_order = 0
-        for at, repeated, late in self._faults:
-            if at > now - WINDOW_NS:
-                duplicates += repeated
-                out_of_order += late
+        faulty = [each for each in self._faults if each.at > now - WINDOW_NS and (each.duplicates or each.out_of_order)]
         swings, swung_by = self._steps.swings(now)
         bursts = [each for each in self._bursts if each.at > now - WINDOW_NS]
         return InputFigures(
@@ -177,17 +184,20 @@ class InputObservation:
             stamps=self._stamps[-_LAST_MESSAGES:],
             delays=self._delays[-_LAST_MESSAGES:],
             drift=self._drift,
-            reading=reading(self._stamps, self._delays),
+            # Across a step they seem to run at any rate.
+            reading=None if self._steps.may_step else reading(self._stamps, self._delays),
             resolution=resolution(self._stamps),
-            duplicates=duplicates,
-            out_of_order=out_of_order,
+            duplicates=sum(each.duplicates for each in faulty),
+            out_of_order=sum(each.out_of_order for each in faulty),
+            faulty_looks=len(faulty),
             nearest=Distribution(self._nearest[:]),
             bursts=len(bursts),
             held=max((each.held for each in bursts), default=0),
             held_up=[(each.at - each.held, each.at) for each in bursts],
             fell_by=fell_by,
             fell_at=fell_at,
-            stepped=self._steps.last(now),
+            stepped=self._steps.last,
+            may_step=self._steps.may_step,
             swings=swings,
             swung_by=swung_by,
         )

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from syncrelay.explain import rules_clock, rules_flow, rules_graph, rules_matching, rules_stamps, words
+from syncrelay.explain import rules_clock, rules_drift, rules_flow, rules_graph, rules_matching, rules_stamps, words
 from syncrelay.explain.codes import MATCHING, Code, Of, Severity, codes_of
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import Finding, Rule, of_each_input
@@ -42,7 +42,7 @@ _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     of_each_input(Code.UNSTAMPED, rules_stamps.unstamped),
     of_each_input(Code.SEVERAL_PUBLISHERS, rules_stamps.several_publishers),
     Rule(Code.CLOCK_STEP, rules_stamps.clock_step),
-    Rule(Code.CLOCK_DRIFT, rules_stamps.clock_drift),
+    Rule(Code.CLOCK_DRIFT, rules_drift.clock_drift),
     Rule(Code.OTHER_CLOCK, rules_stamps.other_clock),
     Rule(Code.OTHER_CLOCK, rules_clock.off_the_clock),
     Rule(Code.NO_COMMON_KEY, rules_stamps.no_common_key),
@@ -61,10 +61,6 @@ _MATCHING_RULES: Final[tuple[Rule, ...]] = (
     Rule(Code.CONSTANT_OFFSET, rules_matching.constant_offset),
 )
 """What they suggest they try, which costs: they are not asked for what a cause explains."""
-
-_OF_DRIFT: Final = frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET})
-"""What a drift brings about, and sooner than it can be proven."""
-_WAIT: Final = "wait some seconds: it is not known yet whether a clock drifts"
 
 _OTHER_RULES: Final[tuple[Rule, ...]] = (
     of_each_input(Code.OUT_OF_ORDER, rules_stamps.out_of_order),
@@ -138,7 +134,9 @@ def explained_by(code: Code) -> frozenset[Code]:
 
 def _first_step(facts: GroupFacts) -> int:
     steps = (each.figures.stepped for each in facts.inputs)
-    return min([facts.figures.now - WINDOW_NS, *(step.at for step in steps if step is not None)])
+    return min(
+        [facts.figures.now - WINDOW_NS, *(step.at for step in steps if step and rules_stamps.is_told(facts, step))]
+    )
 
 
 _SEEN_SINCE: Final[Mapping[Code, Callable[[GroupFacts], int]]] = {
@@ -155,10 +153,11 @@ _SEEN_SINCE: Final[Mapping[Code, Callable[[GroupFacts], int]]] = {
 
 
 class _Cause(NamedTuple):
-    """A cause, when it last held, and whether it was said then: nothing else explained it."""
+    """A cause, when it was last found, when it ended, and whether it was said then: nothing else explained it."""
 
     finding: Finding
     at: int
+    ended: int
     was_said: bool = False
 
 
@@ -174,14 +173,10 @@ class Judge:
         # Of two publishers whose names are not known yet, the same may be said.
         found = [*dict.fromkeys(finding for rule in _CAUSE_RULES for finding in rule.findings(facts))]
         self._remember(found, facts)
-        may_drift = rules_stamps.may_drift(facts)
         for rule in () if facts.is_new else _MATCHING_RULES:
             if self._is_explained(rule.code, facts):
                 continue
-            if not (may_drift and rule.code in _OF_DRIFT):
-                found += rule.findings(facts)
-            else:
-                found += [replace(finding, suggestion=_WAIT) for finding in rule.findings(facts)]
+            found += rule.findings(facts)
         found += self._still_too_wide(found, facts)
         found += [finding for rule in _OTHER_RULES for finding in rule.findings(facts)]
         if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
@@ -191,7 +186,11 @@ class Judge:
             cause = self._causes.get((each.code, each.input))
             if cause is not None and cause.at == facts.figures.now:
                 self._causes[each.code, each.input] = cause._replace(was_said=True)
-        return self._as_bad_as_it_stands(said, facts) if rules_matching.has_few_sets(facts) else said
+        said = self._as_bad_as_it_stands(said, facts) if rules_matching.has_few_sets(facts) else said
+        return tuple(
+            replace(each, suggestion=wait) if (wait := rules_drift.known_soon(facts, each.code)) else each
+            for each in said
+        )
 
     def _still_too_wide(self, found: Iterable[Finding], facts: GroupFacts) -> tuple[Finding, ...]:
         """Return that sets are often too wide, as it was last found, until the share of sets that leave is back.
@@ -227,7 +226,7 @@ class Judge:
             self._causes = {key: cause for key, cause in self._causes.items() if longest_ago <= cause.at <= now}
         for finding in found:
             if finding.explains and finding.code in EXPLAINS:
-                self._causes[finding.code, finding.input] = _Cause(finding, now)
+                self._causes[finding.code, finding.input] = _Cause(finding, now, _ended(finding, facts))
 
     def _is_explained(self, code: Code, facts: GroupFacts) -> bool:
         """Whether a cause that holds now explains all findings of a code."""
@@ -262,12 +261,10 @@ class Judge:
         (few,) = _FEW_SETS.findings(facts)
         over = [each for each in self._causes.values() if each.was_said and _explains(each, few, facts)]
         if over:
-            cause, at, _ = max(over, key=lambda each: each.at)
-            until = f"until {words.seconds(facts.figures.now - at)} ago, {cause.text}"
+            cause, _, ended, _ = max(over, key=lambda each: each.at)
+            until = f"until {words.seconds(facts.figures.now - ended)} ago, {cause.text}"
             text = f"{rules_matching.left_of_possible(facts)}; {until}"
             few = replace(cause, severity=least, text=text, suggestion=None, is_over=True)
-        elif rules_stamps.may_drift(facts):
-            few = replace(few, suggestion=_WAIT)
         return (few, *said)
 
     def _root(self, finding: Finding, facts: GroupFacts) -> Finding:
@@ -308,7 +305,13 @@ def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
     elif rules_matching.has_few_sets(facts):
         # Nor is it one for recently missing sets, however far back the stamps are compared.
         since = max(since, _seen_since(Code.FEW_SETS, facts))
-    return cause.at >= since
+    return (cause.ended if looks_back else cause.at) >= since
+
+
+def _ended(finding: Finding, facts: GroupFacts) -> int:
+    """Return until when a cause that is found now held. That the relay stood still is found for a while after."""
+    now = facts.figures.now
+    return min(now, rules_flow.stood_still_until(facts) or now) if finding.code is Code.TOO_SLOW else now
 
 
 def _seen_since(code: Code, facts: GroupFacts) -> int:

@@ -44,8 +44,9 @@ _FEWEST_PACES: Final = 6
 _STEADY: Final = 0.25
 # ... without counting one poll in this many at either end, in which a busy machine held messages up.
 _ODD: Final = 10
-# That it has is seen of so many periods.
+# That it has is seen of so many periods if most are about as long, else of so many.
 _LATEST: Final = 8
+_LATEST_UNLIKE: Final = 12
 # It has slowed down below the first share of its steady pace, until it is above the second.
 _SLOWED: Final = 0.7
 RECOVERED: Final = 0.85
@@ -89,7 +90,7 @@ def steady_period(received: Sequence[int]) -> float | None:
     return sum(near) / len(near) if whole >= _MOSTLY * len(periods) else None
 
 
-def _about(period: int, periods: Sequence[int]) -> Sequence[int]:
+def _about(period: float, periods: Sequence[int]) -> Sequence[int]:
     """Return which periods, sorted, are about as long."""
     return periods[bisect_left(periods, (1 - _ABOUT) * period) : bisect_right(periods, (1 + _ABOUT) * period)]
 
@@ -120,6 +121,8 @@ class PaceWatch:
         self.now_hz = _pace_hz(periods)
         # A pace that falls is seen of the last few, if hardly any is as short as before: what is lost leaves some so.
         latest = periods[-_LATEST:]
+        if len(_about(median_low(latest), sorted(latest))) < _MOSTLY * _LATEST:
+            latest = periods[-_LATEST_UNLIKE:]
         if self.slowed_from is None and (fell := self._fell_from(_pace_hz(latest), min(sorted(latest)[1:]))):
             self.slowed_from, self.now_hz = fell, _pace_hz(latest)
         elif self.slowed_from is not None:

@@ -125,6 +125,11 @@ def waited_for_relay(facts: GroupFacts) -> tuple[int, int]:
     return max(facts.waited, held_up), _overlapped(facts, [_pauses(facts, each) for each in facts.inputs])
 
 
+def stood_still_until(facts: GroupFacts) -> int | None:
+    """Return until when messages may have been missed while the relay stood still. None where it did not."""
+    return max((each.until + _SENT_AGAIN for each in facts.standstills if each.ns >= _TOO_SLOW), default=None)
+
+
 def _overlapped(facts: GroupFacts, inputs: Iterable[Iterable[tuple[int, int]]]) -> int:
     """Return for how long of a standstill an input was held up. A standstill alone has kept nothing waiting."""
     long = [each for each in facts.standstills if each.ns >= _TOO_SLOW]

@@ -40,10 +40,12 @@ _UNKNOWN: Final = 2 * SECOND
 _NEARLY_ALL: Final = 0.95
 _WATCHED: Final = 10 * SECOND
 # Stamps a constant distance apart may pair wrong messages: at least this many, at least this share of a period apart,
-# scattering by no more than this share, and within this share of a whole number of periods by their times of receipt.
+# of rates that differ by no more than this share, scattering by no more than this share of a period, and within this
+# share of a whole number of periods by their times of receipt.
 _ENOUGH: Final = 20
 _OFF: Final = 0.15
-_CONSTANT: Final = 0.05
+_SAME_RATE: Final = 0.05
+_SCATTERS: Final = 0.25
 _WHOLE: Final = 0.1
 _OTHER_CLOCK: Final = SECOND
 # What is missing was not lost one by one where an input paused for this long, and for so many periods.
@@ -160,11 +162,11 @@ def _whole_periods_off(facts: GroupFacts, first: int, other: int) -> int | None:
     if abs(later) < period / 2 or abs(later) > _OTHER_CLOCK:
         # As nearly always, and seen without measuring.
         return None
-    if abs(one.figures.pace_hz * period / SECOND - 1) > _CONSTANT:
+    if abs(one.figures.pace_hz * period / SECOND - 1) > _SAME_RATE:
         return None
     stamps = (shifted(np.array(each.figures.stamps, dtype=np.int64), each.offset) for each in (one, two))
     signed = signed_distances(*map(np.sort, stamps))
-    if len(signed) < _ENOUGH or quantile(signed, 0.95) - quantile(signed, 0.05) > _CONSTANT * period:
+    if len(signed) < _ENOUGH or quantile(signed, 0.95) - quantile(signed, 0.05) > _SCATTERS * period:
         return None
     distance = quantile(signed, 0.5)
     later = (two.figures.delay or 0) - two.offset - (one.figures.delay or 0) + one.offset
@@ -180,7 +182,7 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     needed = an_input.counts.needed_queue
     overflowed = an_input.figures.dropped.get(DropReason.OVERFLOW, 0)
     is_young = facts.figures.now - facts.figures.began < _YOUNG
-    if needed is None or not overflowed or needed <= facts.queue_size or is_young:
+    if needed is None or not overflowed or needed <= facts.queue_size or is_young or _is_overdue(facts):
         return
     missed_hz = facts.possible_hz - facts.figures.rate_hz
     # A set that leaves a little later than the window ends was not missed.
@@ -198,6 +200,15 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
         f" {facts.queue_size} before their partners came",
         _advice(facts, found),
         Severity.ERROR if facts.is_silent else Severity.WARN,
+    )
+
+
+def _is_overdue(facts: GroupFacts) -> bool:
+    """Whether a required input has just ceased to come: no queue is long enough for that."""
+    now = facts.figures.now
+    return any(
+        each.required and (last := each.figures.last_received) and (now - last) * _pace_hz(each) > _AWAY * 2 * SECOND
+        for each in facts.inputs
     )
 
 

@@ -1,28 +1,29 @@
 """Findings about stamps: unset, of another clock, falling, drifting."""
 
+from collections.abc import Iterable
 from statistics import median_low
 from typing import Final
 
+from syncrelay.clock import Step
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
 from syncrelay.explain.changes import offset_change
-from syncrelay.explain.clocks import Drift, apart
 from syncrelay.explain.codes import Code, Severity
+from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.epochs import BOOT_NS, time_scale
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Fault, Found, blocks, counted, nodes
 from syncrelay.explain.rules_flow import waited_for_relay
 from syncrelay.explain.standing import Standing
+from syncrelay.explain.steps import STEP_NS
 from syncrelay.explain.trials import REQUIRED, Trials, Verdict
 from syncrelay.sync.messages import DropReason
 
 # Stamps further off than this come from another clock, or are older than a queue should hold.
 _OTHER_CLOCK: Final = SECOND
 _TOLD_JUMP: Final = 30 * SECOND
-# A drift is reported after this much change, over at least this time, and only if the delays bend far less than that.
-_DRIFTED: Final = 5_000_000
-_DRIFT_WATCHED: Final = 20 * SECOND
-_DRIFT_BENDS: Final = 8
+# What was held up tells nothing of a clock: of the delays, this quantile does.
+_LEAST_DELAY: Final = 0.1
 # One message in a hundred with a repeated or late stamp is not worth a finding.
 _FAULTY: Final = 0.01
 _SOME: Final = 0.02
@@ -31,23 +32,12 @@ _MOST: Final = 0.5
 _LATENCY: Final = 10 * SECOND
 # Stamps that step there and back this often come from two clocks.
 _FEWEST_SWINGS: Final = 2
-# A large drift can be reported earlier.
-_DRIFTED_SOON: Final = 25_000_000
-_DRIFT_SOON: Final = 4 * SECOND
-# Call a slope significant at this many standard errors; within _MAY_BE, treat it as zero.
-_EVIDENT: Final = 5
-# Student's distribution: from few points, the same certainty takes far more standard errors.
-_EVIDENT_OF_FEW: Final = 240
-_MAY_BE: Final = 2
-_USUAL: Final = 0.95
-# Wait this long for proof of a drift; the second time only, from when sets are missing, unless stamps look like one.
-_DRIFT_PROVEN: Final = 60 * SECOND
-_DRIFT_PROVEN_SILENT: Final = 15 * SECOND
-# Of two inputs, one with less than this share of the other's drift has the better clock.
-_EVIDENTLY: Final = 0.2
-# A drift explains wide spans if it accounts for this share of the tolerance.
+# Recordings are longer.
+_LOOPED: Final = 10 * SECOND
+# Steps of inputs that differ by less than this share are one.
+_STEPPED_ALIKE: Final = 0.25
+# A step of less than this share of the tolerance costs no sets.
 _MATTERS: Final = 0.5
-_STEPPED_ALIKE: Final = SECOND // 2
 # Two ways to measure one offset agree within this share of it.
 _SAME_OFFSET: Final = 0.1
 # Stamps of inputs that run this much alike are of one clock.
@@ -106,11 +96,11 @@ def other_clock(facts: GroupFacts) -> Found:
         return
     # Two messages show whether their stamps run as time does.
     delays = {
-        index: each.figures.delay
+        index: Distribution(each.figures.delays).quantile(_LEAST_DELAY)
         for index, each in enumerate(facts.inputs)
         if each.required and (each.figures.rate_hz or len(each.figures.received) == 1) and len(each.figures.delays) > 1
     }
-    known = {index: delay - facts.inputs[index].offset for index, delay in delays.items() if delay is not None}
+    known = {index: delay - facts.inputs[index].offset for index, delay in delays.items()}
     if len(known) < 2:  # noqa: PLR2004  one alone has no other clock
         return
     # Of two, the one that is farther from this machine's time is odd.
@@ -256,21 +246,20 @@ def clock_step(facts: GroupFacts) -> Found:
         return
     if not facts.by_stamp:
         return
-    # What does not run as time does steps all the time.
-    stepped = [
-        (index, each.figures.stepped)
-        for index, each in enumerate(facts.inputs)
-        if each.figures.stepped and each.figures.reading is None
-    ]
-    steps = [step.by for _, step in stepped if step]
-    if 1 < len(steps) == len(facts.inputs) and max(steps) - min(steps) < _STEPPED_ALIKE:
-        at = max(step.at for _, step in stepped if step)
-        text = f"stamps of all inputs jumped {_forward(steps[0])} against this machine's clock, {_ago(now, at)}"
-        yield Fault(text, _SLEW.format(where="on the machine that stamps them"))
+    steps = {index: step for index, each in enumerate(facts.inputs) if (step := each.figures.stepped)}
+    if 1 < len(steps) == len(facts.inputs) and _is_one_step(steps.values()):
+        # All that changes by less may be the way to us, and a recording that is looped is no clock that was set back.
+        last = max(steps.values())
+        if (-_LOOPED < last.by <= -STEP_NS or last.by >= STEP_NS) and is_told(facts, last):
+            text = f"stamps of all inputs jumped {_forward(last.by)} against this machine's clock, {_ago(now, last.at)}"
+            yield Fault(text, _SLEW.format(where="on the machine that stamps them"))
         return
-    for index, step in stepped:
-        if step is not None:
-            an_input = facts.inputs[index]
+    if any(each.figures.may_step for each in facts.inputs):
+        return
+    for index, step in steps.items():
+        an_input = facts.inputs[index]
+        # What does not run as time does steps all the time.
+        if an_input.figures.reading is None and is_told(facts, step):
             yield Fault(
                 f"stamps of {an_input.name} jumped {_forward(step.by)}, {_ago(now, step.at)}"
                 f"{_of_others(facts, index, step.at)}",
@@ -280,11 +269,26 @@ def clock_step(facts: GroupFacts) -> Found:
             )
 
 
+def is_told(facts: GroupFacts, step: Step) -> bool:
+    """Whether a step is recent, and great enough to cost sets. What comes of it later has findings of its own."""
+    enough = STEP_NS if facts.tolerance is None else min(STEP_NS, round(_MATTERS * facts.tolerance.ns))
+    return abs(step.by) >= enough and 0 <= facts.figures.now - step.at < _TOLD_JUMP
+
+
+def _is_one_step(steps: Iterable[Step]) -> bool:
+    by = [step.by for step in steps]
+    return max(by) - min(by) < max(_STEPPED_ALIKE * max(map(abs, by)), SECOND // 20)
+
+
 def _of_others(facts: GroupFacts, index: int, at: int) -> str:
     """Say that the others' stamps did not jump, where each had messages before and after that moment."""
     others = [each.figures for other, each in enumerate(facts.inputs) if other != index]
     are_known = all((each.flows_since or at) < at < (each.last_received or at) for each in others)
-    return "; those of the other inputs did not" if are_known and not any(each.stepped for each in others) else ""
+    return (
+        "; those of the other inputs did not"
+        if are_known and not any(each.stepped and each.stepped.at >= at - _TOLD_JUMP for each in others)
+        else ""
+    )
 
 
 def _forward(by: int) -> str:
@@ -318,7 +322,7 @@ def time_jump(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
 
 def out_of_order(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find messages that came after one of a later stamp."""
-    count = an_input.figures.out_of_order
+    count = an_input.figures.out_of_order if an_input.figures.faulty_looks > 1 else 0
     if facts.by_stamp and count > _FAULTY * an_input.figures.fed:
         text = f"{counted(count, an_input.figures.fed)} messages of {an_input.name} arrived out of stamp order"
         yield Fault(text, f"check how {nodes(an_input)} stamps and sends")
@@ -326,88 +330,8 @@ def out_of_order(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
 
 def duplicates(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find messages that repeat a stamp; what is held until there is a newer one may be sent again and again."""
-    count = an_input.figures.duplicates
+    count = an_input.figures.duplicates if an_input.figures.faulty_looks > 1 else 0
     if facts.by_stamp and not facts.is_held(index) and count > _FAULTY * an_input.figures.fed:
         text = f"{counted(count, an_input.figures.fed)} messages of {an_input.name} repeat the stamp before them"
         text += f": all are multiples of {words.duration(unit)}" if (unit := an_input.figures.resolution) else ""
         yield Fault(text, f"check how {nodes(an_input)} stamps its messages", explains=_matters(facts, an_input, count))
-
-
-def _drifts(facts: GroupFacts) -> tuple[dict[int, Drift], dict[int, Drift]]:
-    """Return the drifts of the inputs of which they are known, and how they drift away from the others' median."""
-    # What no crystal is off by is another rate.
-    known = {
-        index: each.figures.drift
-        for index, each in enumerate(facts.inputs)
-        if each.figures.drift and each.figures.reading is None
-    }
-    if not facts.by_stamp or len(known) < 2:  # noqa: PLR2004  one alone cannot drift apart
-        return {}, {}
-    return known, {
-        index: apart(drift, median_low([known[other] for other in known if other != index]))
-        for index, drift in known.items()
-    }
-
-
-def may_drift(facts: GroupFacts) -> bool:
-    """Whether a drift that is neither proven nor refuted yet may be why stamps are so far apart.
-
-    For a while only: what takes longer to prove is not why they were apart so soon.
-    """
-    watched, tolerance = facts.figures.now - facts.figures.began, facts.tolerance
-    if tolerance is None or facts.is_recorded or not 0 < watched < _DRIFT_PROVEN:
-        return False
-    nearest = facts.figures.nearest_since if facts.is_silent else facts.figures.nearest
-    if not nearest.share_over(tolerance.ns) or any(each.figures.resolution > tolerance.ns for each in facts.inputs):
-        return False
-    required = [each.figures for each in facts.inputs if each.required]
-    young = [each.flows_since or facts.figures.now for each in required if each.drift is None]
-    if facts.by_stamp and any(facts.figures.now - since < _DRIFT_SOON for since in young):
-        return True
-    needed = max(_MATTERS * tolerance.ns, nearest.quantile(_USUAL) - tolerance.ns) / watched
-    is_urgent = (facts.silent_for if facts.is_silent else watched) >= _DRIFT_PROVEN_SILENT
-    return any(
-        abs(each.slope) >= max(needed, _MAY_BE * each.error)
-        or (not is_urgent and abs(each.slope) + _MAY_BE * each.error >= needed)
-        for each in _drifts(facts)[1].values()
-    )
-
-
-def clock_drift(facts: GroupFacts) -> Found:
-    """Find the input whose stamps drift away from the others' median; of two that may be either, both."""
-    known, between = _drifts(facts)
-    if not known:
-        return
-    most = max(abs(each.slope) for each in between.values())
-    # Of those that are as far from the others, the one whose stamps run least like this machine's clock.
-    odd = max(
-        (index for index, each in between.items() if abs(each.slope) >= (1 - _EVIDENTLY) * most),
-        key=lambda index: abs(known[index].slope),
-    )
-    found = between[odd]
-    enough = _DRIFTED if found.watched_ns >= _DRIFT_WATCHED else _DRIFTED_SOON
-    drifted = abs(found.drifted_ns)
-    if found.watched_ns < _DRIFT_SOON or drifted < max(enough, _DRIFT_BENDS * found.bend_ns):
-        return
-    evident = _EVIDENT * (1 + _EVIDENT_OF_FEW / (found.points - 2) ** 3)
-    if abs(found.slope) < evident * found.error:
-        return
-    others = [index for index in known if index != odd]
-    is_evident = len(others) > 1 or abs(known[others[0]].slope) < _EVIDENTLY * abs(known[odd].slope)
-    a_second = f"{words.duration(abs(found.slope) * SECOND)} a second"
-    ppm = words.figure(abs(found.slope) * 1e6)
-    name = facts.inputs[odd].name
-    against = facts.inputs[others[0]].name if len(others) == 1 else "the other inputs"
-    text = (
-        f"stamps of {name} {'lose' if found.slope > 0 else 'gain'} {a_second} against those of {against} ({ppm} ppm)"
-        if is_evident
-        else f"stamps of {name} and {against} drift apart by {a_second} ({ppm} ppm)"
-    )
-    gone = abs(found.slope) * (facts.figures.now - facts.figures.began)
-    yield Fault(
-        text,
-        "synchronize their clocks with PTP or chrony, or have their drivers stamp with the host's time",
-        input=odd if is_evident else None,
-        # A clock that is off by a few ppm is not why stamps lie far apart today.
-        explains=facts.tolerance is not None and gone >= _MATTERS * facts.tolerance.ns,
-    )

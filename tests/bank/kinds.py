@@ -4,13 +4,13 @@ A new kind is a function here. It returns None where the rig is one in which the
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, TypeAlias
 
 import numpy as np
 
 from syncrelay.config.profile import Mismatch
-from tests.bank.rig import BEGAN, Flow, Rig, S, spans
+from tests.bank.rig import BEGAN, LONGEST_S, Flow, Rig, S, spans
 from tests.explain.scenario import MS
 
 _YEAR: Final = 365.2425 * 86400 * S
@@ -134,7 +134,11 @@ def stamped_late(rig: Rig) -> Truth | None:
     by = round(_log(rig, 20, 300) * MS)
     flow.received = flow.received + by
     truth = _shift(rig, flow, by, "over_slop constant_offset")
-    return None if by > rig.slowest / 2 else truth
+    if truth is None or by > rig.slowest / 2:
+        return None
+    # It is as late as it is stamped late: all that shows is how near the stamps are.
+    nearest = round(float(np.median(spans(rig))))
+    return replace(truth, sizes=(*truth.sizes, nearest), moments=nearest > 0.8 * by)
 
 
 @_kind(policies=_ANY)
@@ -145,8 +149,8 @@ def far_off(rig: Rig) -> Truth | None:
     if any(abs(by - known) < 2 for known in (18, 37, -18, -37)) or _is_trigger_at_once(rig, flow):
         return None
     flow.stamps = flow.stamps + round(by * S)
-    # What lies whole periods off, and is a result that takes that long as like as not.
-    if "slop" in rig.options and _lost(rig) < 0.95:
+    # What lies whole periods off is a result that takes that long as like as not, as is a trigger that is behind.
+    if ("slop" in rig.options and _lost(rig) < 0.95) or (by < 0 and "trigger" in rig.options):
         return None
     return _truth("other_clock", flow, rig.seen(), (abs(by) * S,))
 
@@ -278,7 +282,8 @@ def two_steps(rig: Rig) -> Truth | None:
 def drift(rig: Rig) -> Truth | None:
     """A crystal is off by 30 to 2,000 ppm."""
     flow, ppm = _one(rig), _sign(rig) * _log(rig, 30, 2000)
-    ahead = _log(rig, 0.01, 2) * rig.slop * -np.sign(ppm)
+    # Farther ahead it would be off from the start, which is another fault.
+    ahead = _log(rig, 0.01, 0.8) * rig.slop * -np.sign(ppm)
     flow.stamps = flow.stamps + (flow.true * ppm * 1e-6 + ahead).astype(np.int64)
     shows = (5 * MS + 4 * max(each.jitter for each in rig.flows)) / (abs(ppm) * 1e-6) / S
     return _truth("clock_drift", flow, rig.seen(shows), (abs(ppm),), unit="ppm") if shows < 45 else None
@@ -391,10 +396,14 @@ def pauses(rig: Rig) -> Truth | None:
 def loses(rig: Rig) -> Truth | None:
     """About a third of the messages of an input do not come."""
     flow, share = _one(rig), rig.chance.uniform(0.28, 0.5)
+    # The share of so few is what came of chance, and it is that of the last ten seconds.
+    seen = rig.begin + max(10.0, 30 * rig.slowest / S)
     if flow.period < rig.slowest * 0.99:
         return None
-    flow.keep(~flow.since(rig.begin) | (rig.rng.random(len(flow.true)) >= share))
-    return _truth("few_sets messages_lost", flow, rig.seen(5.0, periods=12), (share,), unit="share")
+    came = ~flow.since(rig.begin) | (rig.rng.random(len(flow.true)) >= share)
+    lost = float(np.mean(~came[flow.since(rig.begin) & ~flow.since(seen)])) if seen < LONGEST_S else 0.0
+    flow.keep(came)
+    return _truth("few_sets messages_lost", flow, seen, (lost,), unit="share") if lost > 0.25 else None
 
 
 @_kind(policies=_ANY, midway=1.0)

@@ -1,0 +1,124 @@
+"""Findings about clocks that drift apart, and what is to be waited for until it is known."""
+
+from statistics import median_low
+from typing import Final
+
+from syncrelay.config import Distance
+from syncrelay.explain import words
+from syncrelay.explain.clocks import Drift, apart
+from syncrelay.explain.codes import Code
+from syncrelay.explain.epochs import OTHER_RATE
+from syncrelay.explain.facts import GroupFacts
+from syncrelay.explain.findings import SECOND, Fault, Found
+
+# A drift is reported after this much change, over at least this time, and only if the delays bend far less than that.
+_DRIFTED: Final = 5_000_000
+_DRIFT_WATCHED: Final = 8 * SECOND
+_DRIFT_BENDS: Final = 8
+# Of what came for less than this, no drift is known.
+_YOUNG: Final = 4 * SECOND
+# Call a slope significant at this many standard errors; within _MAY_BE, treat it as zero.
+_EVIDENT: Final = 5
+# Student's distribution: from few points, the same certainty takes far more standard errors.
+_EVIDENT_OF_FEW: Final = 240
+_MAY_BE: Final = 2
+_USUAL: Final = 0.95
+# Wait this long for proof of a drift; the second time only, from when sets are missing, unless stamps look like one.
+_DRIFT_PROVEN: Final = 60 * SECOND
+_DRIFT_PROVEN_SILENT: Final = 15 * SECOND
+# Of two inputs, one with less than this share of the other's drift has the better clock.
+_EVIDENTLY: Final = 0.2
+# A drift explains wide spans if it accounts for this share of the tolerance.
+_MATTERS: Final = 0.5
+# What a clock brings about, and sooner than it can be proven that it drifts, or was set.
+_OF_DRIFT: Final = frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET, Code.FEW_SETS, Code.UNEXPLAINED})
+_OF_STEP: Final = _OF_DRIFT | {Code.SHORT_QUEUE, Code.OUT_OF_ORDER, Code.CLOCK_DRIFT, Code.OTHER_CLOCK}
+
+
+def known_soon(facts: GroupFacts, code: Code) -> str:
+    """Say what is to be waited for, where what is found may come of a clock of which more will be known soon."""
+    if code in _OF_STEP and facts.by_stamp and any(each.figures.may_step for each in facts.inputs):
+        return "wait some seconds: it is not known yet whether a clock was set"
+    if code in _OF_DRIFT and may_drift(facts):
+        return "wait some seconds: it is not known yet whether a clock drifts"
+    return ""
+
+
+def _drifts(facts: GroupFacts) -> tuple[dict[int, Drift], dict[int, Drift]]:
+    """Return the drifts of the inputs of which they are known, and how they drift away from the others' median."""
+    # What no crystal is off by is another rate.
+    known = {
+        index: each.figures.drift
+        for index, each in enumerate(facts.inputs)
+        if each.figures.drift and each.figures.reading is None
+    }
+    if not facts.by_stamp or len(known) < 2:  # noqa: PLR2004  one alone cannot drift apart
+        return {}, {}
+    return known, {
+        index: apart(drift, median_low([known[other] for other in known if other != index]))
+        for index, drift in known.items()
+    }
+
+
+def may_drift(facts: GroupFacts) -> bool:
+    """Whether a drift that is neither proven nor refuted yet may be why stamps are so far apart.
+
+    For a while only: what takes longer to prove is not why they were apart so soon.
+    """
+    watched, tolerance = facts.figures.now - facts.figures.began, facts.tolerance
+    # How old the latest message is, its period says.
+    if tolerance is None or facts.distance is Distance.AGE or facts.is_recorded or not 0 < watched < _DRIFT_PROVEN:
+        return False
+    nearest = facts.figures.nearest_since if facts.is_silent else facts.figures.nearest
+    if not nearest.share_over(tolerance.ns) or any(each.figures.resolution > tolerance.ns for each in facts.inputs):
+        return False
+    required = [each.figures for each in facts.inputs if each.required]
+    young = [each.flows_since or facts.figures.now for each in required if each.drift is None]
+    if facts.by_stamp and any(facts.figures.now - since < _YOUNG for since in young):
+        return True
+    needed = max(_MATTERS * tolerance.ns, nearest.quantile(_USUAL) - tolerance.ns) / watched
+    is_urgent = (facts.silent_for if facts.is_silent else watched) >= _DRIFT_PROVEN_SILENT
+    return any(
+        abs(each.slope) >= max(needed, _MAY_BE * each.error)
+        or (not is_urgent and abs(each.slope) + _MAY_BE * each.error >= needed)
+        for each in _drifts(facts)[1].values()
+    )
+
+
+def clock_drift(facts: GroupFacts) -> Found:
+    """Find the input whose stamps drift away from the others' median; of two that may be either, both."""
+    known, between = _drifts(facts)
+    if not known:
+        return
+    most = max(abs(each.slope) for each in between.values())
+    # Of those that are as far from the others, the one whose stamps run least like this machine's clock.
+    odd = max(
+        (index for index, each in between.items() if abs(each.slope) >= (1 - _EVIDENTLY) * most),
+        key=lambda index: abs(known[index].slope),
+    )
+    found = between[odd]
+    drifted = abs(found.drifted_ns)
+    if found.watched_ns < _DRIFT_WATCHED or drifted < max(_DRIFTED, _DRIFT_BENDS * found.bend_ns):
+        return
+    evident = _EVIDENT * (1 + _EVIDENT_OF_FEW / (found.points - 2) ** 3)
+    if not evident * found.error <= abs(found.slope) <= OTHER_RATE:
+        return
+    others = [index for index in known if index != odd]
+    is_evident = len(others) > 1 or abs(known[others[0]].slope) < _EVIDENTLY * abs(known[odd].slope)
+    a_second = f"{words.duration(abs(found.slope) * SECOND)} a second"
+    ppm = words.figure(abs(found.slope) * 1e6)
+    name = facts.inputs[odd].name
+    against = facts.inputs[others[0]].name if len(others) == 1 else "the other inputs"
+    text = (
+        f"stamps of {name} {'lose' if found.slope > 0 else 'gain'} {a_second} against those of {against} ({ppm} ppm)"
+        if is_evident
+        else f"stamps of {name} and {against} drift apart by {a_second} ({ppm} ppm)"
+    )
+    gone = abs(found.slope) * (facts.figures.now - facts.figures.began)
+    yield Fault(
+        text,
+        "synchronize their clocks with PTP or chrony, or have their drivers stamp with the host's time",
+        input=odd if is_evident else None,
+        # A clock that is off by a few ppm is not why stamps lie far apart today.
+        explains=facts.tolerance is not None and gone >= _MATTERS * facts.tolerance.ns,
+    )
