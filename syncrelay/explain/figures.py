@@ -31,6 +31,8 @@ class InputFigures:
     """The rate by the median period."""
     slowed_from_hz: float | None = None
     """The steady rate that it had before it slowed down. None if it has not."""
+    may_be_slower: bool = False
+    """Whether its last few messages came so much slower that it has slowed down if they go on so."""
     fed: int = 0
     """How many messages arrived."""
     dropped: Mapping[DropReason, int] = field(default_factory=dict)

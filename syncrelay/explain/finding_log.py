@@ -8,7 +8,7 @@ from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import Finding
 from syncrelay.explain.judge import explanation
-from syncrelay.explain.rules_drift import known_soon
+from syncrelay.explain.known_soon import known_soon
 from syncrelay.explain.standing import Standing
 
 _SECOND: Final = 1_000_000_000

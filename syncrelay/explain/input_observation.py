@@ -177,6 +177,7 @@ class InputObservation:
             usual_hz=usual_hz,
             pace_hz=self._pace.now_hz,
             slowed_from_hz=self._pace.slowed_from if rate_hz else None,
+            may_be_slower=self._pace.may_be_slower,
             fed=fed,
             dropped=dropped,
             flows_since=self._flows_since,

@@ -20,6 +20,7 @@ from syncrelay.explain.codes import MATCHING, Code, Of, Severity, codes_of
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import Finding, Rule, of_each_input
 from syncrelay.explain.input_observation import WINDOW_NS
+from syncrelay.explain.known_soon import known_soon
 from syncrelay.explain.standing import BACK, Standing
 
 _CAUSE_RULES: Final[tuple[Rule, ...]] = (
@@ -188,8 +189,7 @@ class Judge:
                 self._causes[each.code, each.input] = cause._replace(was_said=True)
         said = self._as_bad_as_it_stands(said, facts) if rules_matching.has_few_sets(facts) else said
         return tuple(
-            replace(each, suggestion=wait) if (wait := rules_drift.known_soon(facts, each.code)) else each
-            for each in said
+            replace(each, suggestion=wait) if (wait := known_soon(facts, each.code)) else each for each in said
         )
 
     def _still_too_wide(self, found: Iterable[Finding], facts: GroupFacts) -> tuple[Finding, ...]:

@@ -47,6 +47,8 @@ _ODD: Final = 10
 # That it has is seen of so many periods if most are about as long, else of so many.
 _LATEST: Final = 8
 _LATEST_UNLIKE: Final = 12
+# So few may show that it does.
+_FEW: Final = 2
 # It has slowed down below the first share of its steady pace, until it is above the second.
 _SLOWED: Final = 0.7
 RECOVERED: Final = 0.85
@@ -103,6 +105,8 @@ class PaceWatch:
         """The pace of the last messages, 0 of too few to tell."""
         self.slowed_from: float | None = None
         """The steady pace that it had before it slowed down, None if it has not."""
+        self.may_be_slower = False
+        """Whether the last few periods are alike, and so long that it has slowed down if they go on so."""
         self._paces: deque[float] = deque(maxlen=_PACES)
 
     def forget(self) -> None:
@@ -113,6 +117,7 @@ class PaceWatch:
     def observe(self, times: Sequence[int]) -> None:
         """Take the stamps of the last messages, or when they were received, in nanoseconds."""
         last = times[-_PERIODS - 1 :]
+        self.may_be_slower = False
         if len(last) <= _PERIODS:
             self.now_hz = 0.0
             self.slowed_from = None
@@ -129,6 +134,9 @@ class PaceWatch:
             self.now_hz = _pace_hz(latest)
             self.slowed_from = self.slowed_from if self.now_hz < RECOVERED * self.slowed_from else None
         if self.now_hz and self.slowed_from is None:
+            few = periods[-_FEW:]
+            is_alike = len(_about(median_low(few), sorted(few))) == _FEW
+            self.may_be_slower = is_alike and self._fell_from(_pace_hz(few), min(few)) is not None
             self._paces.append(self.now_hz)
 
     def _fell_from(self, now_hz: float, short: int) -> float | None:

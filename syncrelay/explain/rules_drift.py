@@ -1,4 +1,4 @@
-"""Findings about clocks that drift apart, and what is to be waited for until it is known."""
+"""Findings about clocks that drift apart."""
 
 from statistics import median_low
 from typing import Final
@@ -6,7 +6,6 @@ from typing import Final
 from syncrelay.config import Distance
 from syncrelay.explain import words
 from syncrelay.explain.clocks import Drift, apart
-from syncrelay.explain.codes import Code
 from syncrelay.explain.epochs import OTHER_RATE
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import SECOND, Fault, Found
@@ -30,18 +29,6 @@ _DRIFT_PROVEN_SILENT: Final = 15 * SECOND
 _EVIDENTLY: Final = 0.2
 # A drift explains wide spans if it accounts for this share of the tolerance.
 _MATTERS: Final = 0.5
-# What a clock brings about, and sooner than it can be proven that it drifts, or was set.
-_OF_DRIFT: Final = frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET, Code.FEW_SETS, Code.UNEXPLAINED})
-_OF_STEP: Final = _OF_DRIFT | {Code.SHORT_QUEUE, Code.OUT_OF_ORDER, Code.CLOCK_DRIFT, Code.OTHER_CLOCK}
-
-
-def known_soon(facts: GroupFacts, code: Code) -> str:
-    """Say what is to be waited for, where what is found may come of a clock of which more will be known soon."""
-    if code in _OF_STEP and facts.by_stamp and any(each.figures.may_step for each in facts.inputs):
-        return "wait some seconds: it is not known yet whether a clock was set"
-    if code in _OF_DRIFT and may_drift(facts):
-        return "wait some seconds: it is not known yet whether a clock drifts"
-    return ""
 
 
 def _drifts(facts: GroupFacts) -> tuple[dict[int, Drift], dict[int, Drift]]:

@@ -1,6 +1,7 @@
 """Findings about matching: sets too wide, queues too short, optional inputs left out, sets that do not leave."""
 
 from collections.abc import Callable
+from itertools import combinations
 from statistics import median_low
 from typing import Final
 
@@ -34,6 +35,7 @@ _MISSING: Final = 0.05
 _BACK: Final = 3
 # It is away when this many of its messages are overdue.
 _AWAY: Final = 3
+_SILENT: Final = 5 * SECOND
 # An input that sent a single message has no known period. Wait for it no longer than this.
 _UNKNOWN: Final = 2 * SECOND
 # If this share of the possible sets left, no set was missed for what a queue dropped.
@@ -88,7 +90,32 @@ def over_slop(facts: GroupFacts) -> Found:
     if 0 < len(coarse) < len(facts.inputs):
         text += "".join(f"; stamps of {name} are multiples of {words.duration(unit)}" for name, unit in coarse.items())
         check = f"check whether {all_of(coarse)} rounds its stamps"
+    odd = _odd_one(facts) if tolerance.key in text else None
+    if odd is not None and facts.inputs[odd].name not in text:
+        text += f"; it is {facts.inputs[odd].name} that is off, the others are near each other"
     yield Fault(text, _advice(facts, found) or check, severity)
+
+
+def _odd_one(facts: GroupFacts) -> int | None:
+    """Return the input whose stamps lie off those of all others, which lie near each other; None if there is none."""
+    tolerance, required = facts.tolerance, [index for index, each in enumerate(facts.inputs) if each.required]
+    if tolerance is None or len(required) < 3:  # noqa: PLR2004  of two, either may be
+        return None
+    stamps = {
+        index: np.sort(
+            shifted(np.array(facts.inputs[index].figures.stamps, dtype=np.int64), facts.inputs[index].offset)
+        )
+        for index in required
+    }
+    far = []
+    for one, other in combinations(required, 2):
+        distances = signed_distances(*sorted((stamps[one], stamps[other]), key=len))
+        if len(distances) < _FEWEST_OF_NONE:
+            return None
+        if abs(quantile(distances, 0.5)) > tolerance.ns:
+            far.append({one, other})
+    odd = set.intersection(*far) if len(far) > 1 else set()
+    return odd.pop() if len(odd) == 1 and len(far) == len(required) - 1 else None
 
 
 def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
@@ -172,7 +199,10 @@ def _whole_periods_off(facts: GroupFacts, first: int, other: int) -> int | None:
     later = (two.figures.delay or 0) - two.offset - (one.figures.delay or 0) + one.offset
     apart = distance + later
     whole = round(apart / period)
-    if not whole or abs(distance) < _OFF * period or abs(apart - whole * period) > _WHOLE * period:
+    delay = max((two.figures.delay or 0) - two.offset, (one.figures.delay or 0) - one.offset, key=abs)
+    # Results that take long have the stamps of what they are of. None is stamped before its time.
+    may_be_result = delay > -period / 4 and abs(distance) < _OFF * period
+    if not whole or may_be_result or abs(apart - whole * period) > _WHOLE * period:
         return None
     return round(distance - whole * period)
 
@@ -182,7 +212,7 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     needed = an_input.counts.needed_queue
     overflowed = an_input.figures.dropped.get(DropReason.OVERFLOW, 0)
     is_young = facts.figures.now - facts.figures.began < _YOUNG
-    if needed is None or not overflowed or needed <= facts.queue_size or is_young or _is_overdue(facts):
+    if needed is None or not overflowed or needed <= facts.queue_size or is_young or is_overdue(facts):
         return
     missed_hz = facts.possible_hz - facts.figures.rate_hz
     # A set that leaves a little later than the window ends was not missed.
@@ -203,13 +233,13 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     )
 
 
-def _is_overdue(facts: GroupFacts) -> bool:
-    """Whether a required input has just ceased to come: no queue is long enough for that."""
-    now = facts.figures.now
-    return any(
-        each.required and (last := each.figures.last_received) and (now - last) * _pace_hz(each) > _AWAY * 2 * SECOND
-        for each in facts.inputs
-    )
+def is_overdue(facts: GroupFacts) -> InputFacts | None:
+    """Return a required input that has just ceased to come: no queue is long enough for that. Later it is silent."""
+    for each in facts.inputs:
+        quiet = facts.figures.now - (each.figures.last_received or 0)
+        if each.required and quiet < _SILENT and quiet * _pace_hz(each) > 2 * _AWAY * SECOND:
+            return each
+    return None
 
 
 def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:

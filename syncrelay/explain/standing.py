@@ -128,11 +128,13 @@ class ShareWindow:
         self._least_period = least_period
         self._polls: deque[_Poll] = deque()
         self._is_pausing: dict[int, bool] = {}
+        self._paced: set[int] = set()
         self._has_clock = False
 
     def clear(self) -> None:
         """Start afresh: a clock was set, or nothing was fed for a while."""
         self._polls.clear()
+        self._paced.clear()
 
     def add(
         self, counts: Sequence[InputCounts], sets: int, paces: Sequence[Pace], *, now: int, clock: int | None = None
@@ -167,6 +169,10 @@ class ShareWindow:
         """Return how many messages each input should have sent by now; while all are away, nothing is owed."""
         if not self._polls:
             return fed
+        for place, index in enumerate(self._counted):
+            if index not in self._paced and (period := paces[index].period) is not None:
+                self._paced.add(index)
+                self._count_again(place, period)
         before = self._polls[-1]
         last = max((each.last for each in paces if each.last is not None), default=before.at)
         owed = []
@@ -177,6 +183,13 @@ class ShareWindow:
             else:
                 owed.append(owed_before + max(0, min(now, round(last + _LATE * period)) - before.at) / period)
         return tuple(owed)
+
+    def _count_again(self, place: int, period: float) -> None:
+        """Count what an input owed since the first poll, now that its period is known."""
+        first = self._polls[0]
+        for number, poll in enumerate(self._polls):
+            owed = first.owed[place] + (poll.at - first.at) / period
+            self._polls[number] = poll._replace(owed=(*poll.owed[:place], owed, *poll.owed[place + 1 :]))
 
     def _since(self, first: _Poll) -> Share:
         last = self._polls[-1]

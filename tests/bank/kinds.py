@@ -92,25 +92,26 @@ def _shift(rig: Rig, flow: Flow, by: int, codes: str) -> Truth | None:
     lost, period = _lost(rig), max(each.period for each in rig.flows)
     is_same = all(abs(each.period / period - 1) < 0.01 for each in rig.flows)
     is_whole = is_same and abs(by) > 0.7 * period and max(each.jitter for each in rig.flows) < 0.05 * period
-    # Stamps that are whole periods off fit those of others, and may be right: results may take that long.
-    distances = spans(rig)
+    # Stamps that are whole periods off fit those of others, and may be right: results may take that long. Of inputs
+    # that are not measured at the same time, nobody can say which belong together.
+    distances = spans(rig, [flow, pivot])
     fits = len(distances) and np.median(distances) < 0.15 * period
-    if (lost < 0.95 and not (is_whole and lost < 0.05)) or (is_whole and fits):
-        flow.stamps = before
-        return None
-    # Of two free-running inputs it is the distance of neighbours that is seen.
     n = min(len(pivot.true), len(flow.true), 50)
     phase = int(np.median(flow.true[:n] - pivot.true[:n])) if is_same else 0
+    if (lost < 0.95 and not (is_whole and lost < 0.05)) or (is_whole and (fits or abs(phase) > 0.08 * period)):
+        flow.stamps = before
+        return None
     late = max(each.lateness for each in rig.flows) - min(each.lateness for each in rig.flows)
     # Of two, whose stamps are off by less than they are late by, either may be.
     delay = float(np.median(flow.received - (flow.stamps - BEGAN)))
     either = len(rig.flows) == 2 and (abs(by) < max(100 * MS, 2 * late) or 0 <= delay < 100 * MS)
-    truth = _truth(codes, flow, rig.seen(), (abs(by), abs(by + phase)), moments=True)
-    return (
-        Truth(truth.codes, frozenset(each.topic for each in rig.flows), truth.seen, truth.sizes, moments=True)
-        if either
-        else truth
-    )
+    topics = frozenset(each.topic for each in rig.flows) if either else frozenset({flow.topic})
+    # Of two free-running inputs it is the distance of neighbours that is seen, and no more than that where some take so
+    # much longer on their way that it can't be said which were sent together.
+    nearest = int(np.median(spans(rig)))
+    is_seen = abs(by) < 0.4 * period or late < 0.15 * period
+    sizes = (abs(by), abs(by + phase), *(() if is_seen else (nearest,)))
+    return Truth(frozenset(codes.split()), topics, rig.seen(), sizes, moments=is_seen)
 
 
 @_kind(same_rate=True)
@@ -138,7 +139,10 @@ def stamped_late(rig: Rig) -> Truth | None:
         return None
     # It is as late as it is stamped late: all that shows is how near the stamps are.
     nearest = round(float(np.median(spans(rig))))
-    return replace(truth, sizes=(*truth.sizes, nearest), moments=nearest > 0.8 * by)
+    # Beside one that comes so often that its messages are near to all, the others have only each other.
+    slow = [each for each in rig.flows if each is flow or each.period > 2 * by]
+    topics = truth.topics if len(slow) == len(rig.flows) else frozenset(each.topic for each in slow)
+    return replace(truth, topics=topics, sizes=(*truth.sizes, nearest), moments=nearest > 0.8 * by)
 
 
 @_kind(policies=_ANY)
@@ -330,8 +334,10 @@ def out_of_order(rig: Rig) -> Truth | None:
     """Some messages come after later ones."""
     flow = _one(rig)
     of = (rig.rng.random(len(flow.true)) < rig.chance.uniform(0.1, 0.4)) & flow.since(rig.begin)
-    flow.received = flow.received + of * round(flow.period * rig.chance.uniform(1.3, 3))
-    return _truth("out_of_order", flow, rig.seen(periods=12))
+    by = round(flow.period * rig.chance.uniform(1.3, 3))
+    flow.received = flow.received + of * by
+    # Stamps that fall by more than a second have jumped, as they do in the engine.
+    return _truth("out_of_order" if by < S else "out_of_order time_jump", flow, rig.seen(periods=12))
 
 
 @_kind(midway=0.5)
