@@ -126,18 +126,22 @@ class PaceWatch:
         self.now_hz = _pace_hz(periods)
         # A pace that falls is seen of the last few, if hardly any is as short as before: what is lost leaves some so.
         latest = periods[-_LATEST:]
-        if len(_about(median_low(latest), sorted(latest))) < _MOSTLY * _LATEST:
-            latest = periods[-_LATEST_UNLIKE:]
-        if self.slowed_from is None and (fell := self._fell_from(_pace_hz(latest), min(sorted(latest)[1:]))):
+        fell = self._fell_in(latest)
+        if fell and len(_about(median_low(latest), sorted(latest))) < _MOSTLY * _LATEST:
+            fell = self._fell_in(periods[-_LATEST_UNLIKE:])
+        if self.slowed_from is None and fell:
             self.slowed_from, self.now_hz = fell, _pace_hz(latest)
         elif self.slowed_from is not None:
             self.now_hz = _pace_hz(latest)
             self.slowed_from = self.slowed_from if self.now_hz < RECOVERED * self.slowed_from else None
         if self.now_hz and self.slowed_from is None:
-            few = periods[-_FEW:]
-            is_alike = len(_about(median_low(few), sorted(few))) == _FEW
-            self.may_be_slower = is_alike and self._fell_from(_pace_hz(few), min(few)) is not None
+            few = sorted(periods[-_FEW:])
+            if few[0] * self.now_hz * _SLOWED > _SECOND and len(_about(few[0], few)) == _FEW:
+                self.may_be_slower = self._fell_from(_pace_hz(few), few[0]) is not None
             self._paces.append(self.now_hz)
+
+    def _fell_in(self, latest: Sequence[int]) -> float | None:
+        return None if self.slowed_from else self._fell_from(_pace_hz(latest), sorted(latest)[1])
 
     def _fell_from(self, now_hz: float, short: int) -> float | None:
         if not now_hz or len(self._paces) < _FEWEST_PACES or now_hz >= _SLOWED * max(self._paces):

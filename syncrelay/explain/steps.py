@@ -53,6 +53,7 @@ class StampSteps:
     def __init__(self) -> None:
         self._before: tuple[Sequence[int], Sequence[int]] = (), ()
         self._levels: deque[int] = deque(maxlen=_LEVELS)
+        self._range: tuple[int, int] | None = None
         self._off: list[int] = []
         self._change = _Change(0, 0)
         self._swung: Step | None = None
@@ -70,6 +71,7 @@ class StampSteps:
     def forget_levels(self) -> None:
         """Bear that messages take another time from now on."""
         self._levels.clear()
+        self._range = None
         self._off.clear()
 
     @property
@@ -93,11 +95,15 @@ class StampSteps:
         if len(levels) < _FEWEST:
             levels.append(least)
             return None
-        low, high = min(levels), max(levels)
+        low, high = self._range or (min(levels), max(levels))
         margin = (high - low) * max(1, _KNOWN_OF // len(levels)) + _LEAST
         side = (least > high + margin) - (least < low - margin)
         if not side or (self._off and (self._off[-1] > high) is not (side > 0)):
             self._off.clear()
+            self._range = None
+            if low <= least <= high and low < levels[0] < high:
+                # As nearly always, and seen without looking at all of them.
+                self._range = low, high
             levels.append(least)
             return None
         if not self._off:
@@ -112,6 +118,7 @@ class StampSteps:
 
     def _concludes(self, side: int, margin: float, period: Callable[[], float]) -> int | None:
         """Return when a clock was set, if what lies on another level does so because of that."""
+        self._range = None
         latest = self._off[-_CONFIRMED:]
         level = median_low(latest)
         before = median_low(self._levels)
