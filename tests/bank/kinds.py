@@ -95,7 +95,9 @@ def _shift(rig: Rig, flow: Flow, by: int, codes: str) -> Truth | None:
     # Stamps that are whole periods off fit those of others, and may be right: results may take that long. Of inputs
     # that are not measured at the same time, nobody can say which belong together.
     distances = spans(rig, [flow, pivot])
-    fits = len(distances) and np.median(distances) < 0.15 * period
+    if not len(distances) or not len(spans(rig)):
+        return None
+    fits = np.median(distances) < 0.15 * period
     n = min(len(pivot.true), len(flow.true), 50)
     phase = int(np.median(flow.true[:n] - pivot.true[:n])) if is_same else 0
     if (lost < 0.95 and not (is_whole and lost < 0.05)) or (is_whole and (fits or abs(phase) > 0.08 * period)):

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from itertools import count
 from typing import Any, Final
 
 import numpy as np
@@ -23,6 +24,7 @@ IN_TIME_S: Final = 7.0
 _GRACE_S: Final = 15.0
 _SIZE: Final = 0.2
 _HEALTHY_S: Final = 60.0
+_ATTEMPTS: Final = 100
 # A standstill of the relay is truly told, for as long as it is seen.
 _STALL_TOLD_S: Final = 12.0
 _NOT_YET: Final = "not known yet"
@@ -108,8 +110,11 @@ def drawn(seed: int, kinds: Sequence[str], n_faults: int) -> Drawn:
         )
         _stall(rig)
         return Drawn(seed, (), rig, (), _HEALTHY_S, _looks(chance, _HEALTHY_S))
-    names = tuple(chance.sample(list(kinds), min(n_faults, len(kinds))))
-    while True:
+    truths: tuple[Truth, ...] = ()
+    for attempt in count():
+        if not attempt % _ATTEMPTS:
+            # Some kinds do not go together.
+            names = tuple(chance.sample(list(kinds), min(n_faults, len(kinds))))
         rig, truths = _faulty(chance, [KINDS[each] for each in names])
         if truths:
             break
@@ -129,6 +134,9 @@ def _faulty(chance: random.Random, kinds: list[Kind]) -> tuple[Rig, tuple[Truth,
     rig = a_rig(chance, policy, same_rate=any(each.same_rate for each in kinds))
     truths = []
     for kind in kinds:
+        if not all(len(each.true) for each in rig.flows):
+            # Of what does not come, nothing else can be seen.
+            return rig, ()
         rig.begin = 0.0
         if chance.random() < kind.midway:
             rig.begin = 6 + 10 * chance.random() + 8 * rig.slowest / S
