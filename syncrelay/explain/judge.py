@@ -305,7 +305,8 @@ def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
     elif rules_matching.has_few_sets(facts):
         # Nor is it one for recently missing sets, however far back the stamps are compared.
         since = max(since, _seen_since(Code.FEW_SETS, facts))
-    return (cause.ended if looks_back else cause.at) >= since
+    # Nor is one that ended when fewer sets, or none, should have left since, however long it is remembered.
+    return (cause.ended if looks_back or finding.severity is Severity.ERROR else cause.at) >= since
 
 
 def _ended(finding: Finding, facts: GroupFacts) -> int:
