@@ -109,12 +109,15 @@ def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
     newest = _newest(stamps, delays)
     scatter = _scatter(delays[newest])
     # Coarse stamps scatter by as much as they are rounded.
-    if scatter < _LEAST_SCATTER or scatter < 2 * resolution(stamps):
+    if scatter < _LEAST_SCATTER or scatter < 2 * _unit(stamps):
         return None
     last = [(stamp, stamp + delay) for stamp, delay in zip(stamps[newest], delays[newest], strict=True)]
-    if len(last) < _SHOW_A_UNIT or last[-1][1] - last[0][1] < _WATCHED:
+    if len(last) < _SHOW_A_UNIT:
         return None
-    return _of_parts(last, scatter) or _of_rate(last, scatter)
+    found = _of_rate(last, scatter)
+    if last[-1][1] - last[0][1] < _WATCHED:
+        return found if found is not None and found.is_unit else None
+    return _of_parts(last, scatter) or found
 
 
 def resolution(stamps: Sequence[int]) -> int:
@@ -122,12 +125,20 @@ def resolution(stamps: Sequence[int]) -> int:
 
     0 too of a sensor that is as regular as that, whose stamps may have been rounded or not, and of one stamp alone.
     """
-    last = stamps[-_ENOUGH:]
-    unit = next((unit for unit in _RESOLUTIONS if not any(stamp % unit for stamp in last)), 0)
+    last, unit = stamps[-_ENOUGH:], _unit(stamps)
     if not unit or len(last) < _FEWEST:
         return 0
-    periods = Counter(period for period in map(sub, last[1:], last) if period)
-    return unit if 0 < max(periods.values(), default=0) <= _REGULAR * len(last) else 0
+    periods = Counter(map(sub, last[1:], last))
+    if periods[0]:
+        # No sensor is so regular that it measures twice at a time.
+        distinct = set(stamps)
+        return unit if len(distinct) > 1 and not any(stamp % unit for stamp in distinct) else 0
+    return unit if max(periods.values()) <= _REGULAR * len(last) else 0
+
+
+def _unit(stamps: Sequence[int]) -> int:
+    last = stamps[-_ENOUGH:]
+    return next((unit for unit in _RESOLUTIONS if not any(stamp % unit for stamp in last)), 0)
 
 
 def _of_parts(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:
