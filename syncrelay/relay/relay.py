@@ -14,7 +14,7 @@ from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.calls import Calls
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError, SyncRelayError
-from syncrelay.explain import GroupReport, Tape
+from syncrelay.explain import GroupReport, Severity, Tape
 from syncrelay.logs import name_after
 from syncrelay.relay.bindings import GroupBindings
 from syncrelay.relay.clock import WaitingClock
@@ -44,6 +44,8 @@ _ASKED_S = 3.0
 _AFTER_FAILURE_S = 0.1
 # `look` goes on at most this much longer for groups that have just started.
 _LONGER_S = 10.0
+# So many sets in a row that should have come and did not are no chance, but do not tell why either.
+_DUE = 3
 _ACTIVE = (Phase.STARTING, Phase.RUNNING, Phase.PAUSED)
 _WITHOUT_GROUPS = (Phase.UNCONFIGURED, Phase.FINALIZED)
 # How long an end waits for reliable subscribers to acknowledge what was published on all outputs. They do so only at
@@ -291,14 +293,14 @@ class Relay:
     def look(self, seconds: float, *, is_over: Callable[[], bool] = lambda: False) -> tuple[GroupReport, ...]:
         """Run for a time, and return a report of each group.
 
-        It takes a little longer where a group without a set has just got its first messages, or where its publishers
-        may not have been found yet.
+        It takes a little longer where a group without a set has just got its first messages, where its publishers may
+        not have been found yet, or where sets have just stopped.
         """
         end = self._runtime.monotonic() + seconds
         latest = end + _LONGER_S
         while not is_over() and (left := end - self._runtime.monotonic()) > 0:
             self.step(left)
-            if self._runtime.monotonic() >= end and any(map(_is_early, self.evaluate())):
+            if self._runtime.monotonic() >= end and any(map(is_early, self.evaluate())):
                 end = min(end + EVALUATE_S, latest)
         return self.evaluate()
 
@@ -392,7 +394,11 @@ class Relay:
             self._runtime.sleep(_AFTER_FAILURE_S)
 
 
-def _is_early(report: GroupReport) -> bool:
-    """Whether more will be known soon about why a group gives no set."""
+def is_early(report: GroupReport) -> bool:
+    """Whether more will be known soon about why a group gives no set, or has just stopped doing so."""
     facts = report.facts
-    return facts.is_new or (facts.is_discovering and not all(each.graph.publishers for each in facts.inputs))
+    is_incomplete = facts.is_discovering and not all(each.graph.publishers for each in facts.inputs)
+    due = facts.silent_for / 1e9 * facts.possible_hz
+    is_well = all(each.severity is Severity.OK for each in report.problems)
+    has_just_stopped = is_well and (facts.figures.share.is_pausing or due >= _DUE)
+    return facts.is_new or is_incomplete or has_just_stopped

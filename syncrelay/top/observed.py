@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from syncrelay.config.wording import counted
-from syncrelay.explain import GroupReport, Severity, words
+from syncrelay.explain import Code, GroupReport, Severity, words
 from syncrelay.status import RelayState, status_of
 from syncrelay.top.plain import WIDTH, group_lines, wrapped
 
@@ -53,4 +53,7 @@ def _fault(report: GroupReport, looked_s: float) -> str | None:
             return f"has {counted(count, word)}"
     if report.facts.figures.last_set is None:
         return f"produced no set in {looked_s:.0f} s, which is too short to tell why: observe it for longer"
+    # Doctor warns of it too.
+    if (said := report.findings[-1]).code is Code.STARTING:
+        return f"produced {said.text}: observe it for longer"
     return None

@@ -10,7 +10,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from syncrelay.config.profile import Mismatch
-from tests.bank.rig import BEGAN, LONGEST_S, Flow, Rig, S, spans
+from tests.bank.rig import LONGEST_S, Flow, Rig, S, spans
 from tests.explain.scenario import MS
 
 _YEAR: Final = 365.2425 * 86400 * S
@@ -105,7 +105,7 @@ def _shift(rig: Rig, flow: Flow, by: int, codes: str) -> Truth | None:
         return None
     late = max(each.lateness for each in rig.flows) - min(each.lateness for each in rig.flows)
     # Of two, whose stamps are off by less than they are late by, either may be.
-    delay = float(np.median(flow.received - (flow.stamps - BEGAN)))
+    delay = float(np.median(flow.received - (flow.stamps - rig.began)))
     either = len(rig.flows) == 2 and (abs(by) < max(100 * MS, 2 * late) or 0 <= delay < 100 * MS)
     topics = frozenset(each.topic for each in rig.flows) if either else frozenset({flow.topic})
     # Of two free-running inputs it is the distance of neighbours that is seen, and no more than that where some take so
@@ -192,7 +192,7 @@ def local_time(rig: Rig) -> Truth | None:
 @_kind(policies=_ANY)
 def uptime(rig: Rig) -> Truth | None:
     """Stamps count from boot."""
-    return _time_scale(rig, -BEGAN / S + _log(rig, 20, 3_000_000), "boot")
+    return _time_scale(rig, -rig.began / S + _log(rig, 20, 3_000_000), "boot")
 
 
 @_kind()
@@ -210,7 +210,7 @@ def rate(rig: Rig) -> Truth | None:
     flow = _one(rig)
     factor = rig.chance.choice([0.1, 0.5, 2.0, rig.chance.uniform(0.3, 0.95), rig.chance.uniform(1.05, 3)])
     began = -_log(rig, 1, 100) * S
-    flow.stamps = (BEGAN + began + (flow.true - began) * factor).astype(np.int64)
+    flow.stamps = (rig.began + began + (flow.true - began) * factor).astype(np.int64)
     off = abs(factor - 1) * (5 + 5 * rig.slowest / S)
     return (
         _truth("other_clock", flow, max(5.0, rig.seen()), (factor,), unit="times") if off * S > 2 * rig.slop else None
@@ -241,7 +241,7 @@ def read_as_nanoseconds(rig: Rig) -> Truth | None:
 def sec_holds_ms(rig: Rig) -> Truth | None:
     """The field sec holds milliseconds: of the time since boot, or what 32 bits keep of that since 1970."""
     flow = _one(rig)
-    since = rig.chance.choice([BEGAN, round(_log(rig, 10, 500_000) * S)])
+    since = rig.chance.choice([rig.began, round(_log(rig, 10, 500_000) * S)])
     ms = (flow.true + since) // MS
     flow.stamps = ((ms + 2**31) % 2**32 - 2**31) * S
     return _truth("other_clock duplicates time_jump", flow, rig.seen(), says=("milliseconds",))

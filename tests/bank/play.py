@@ -63,6 +63,8 @@ class Drawn:
     truths: tuple[Truth, ...]
     seconds: float
     looks: list[float]
+    well: Rig
+    """The rig as it was before its faults."""
 
     @property
     def sources(self) -> list[Source]:
@@ -88,7 +90,7 @@ class Result:
     """What came of a draw: `first` is the first sentence that is neither well nor about a stall of the relay."""
 
     drawn: Drawn
-    score: Score
+    score: Score = Score.NOTHING
     why: str = ""
     first: tuple[float, Finding] | None = None
     said: list[tuple[float, str]] = field(default_factory=list)
@@ -98,24 +100,67 @@ class Result:
     """What is wrong with what was suggested."""
     logged: float | None = None
 
+    def hears(self, second: float, shown: Finding, *, is_open: bool = False) -> bool:
+        """Take what explains most at a second, and return whether it can be judged.
 
-def drawn(seed: int, kinds: Sequence[str], n_faults: int) -> Drawn:
-    """Draw what a seed gives."""
+        It is open while what it suggests is still to be tried.
+        """
+        draw, text = self.drawn, _sentence(shown)
+        if not self.said or self.said[-1][1] != text:
+            self.said.append((second, text))
+        if shown.severity is Severity.OK or shown.code is Code.STARTING or is_of_stall(draw, shown, second):
+            return False
+        self.lasted += 1.03
+        self.first = self.first or (second, shown)
+        # A finding may say itself that more will be known soon.
+        if not draw.truths or is_open or _NOT_YET in text:
+            return False
+        self.first = second, shown
+        # What has only just begun may be less than it will be.
+        fits = [fit(draw, truth, second, shown) for truth in draw.truths if second < truth.seen]
+        return (Score.HALF, "size") not in fits
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the first sentence names the fault, in time or late."""
+        return self.score in (Score.TOLD, Score.LATE)
+
+    def judge(self) -> Truth | None:
+        """Score the first sentence, and return the truth that it fits best."""
+        truths = self.drawn.truths
+        if not truths:
+            self.score = Score.OTHER if self.first else Score.TOLD
+        if not truths or self.first is None:
+            return None
+        scores = [fit(self.drawn, truth, *self.first) for truth in truths]
+        self.score, self.why = min(scores, key=lambda each: list(Score).index(each[0]))
+        return truths[scores.index((self.score, self.why))]
+
+
+def drawn(
+    seed: int, kinds: Sequence[str], n_faults: int, *, midway: tuple[float, float] = (6, 16), began: int = BEGAN
+) -> Drawn:
+    """Draw what a seed gives.
+
+    A fault that begins while the relay runs does so between the seconds `midway`, later where messages are rare.
+    `began` is second 0 by the machine's clock.
+    """
     chance = random.Random(f"bank {seed} {n_faults}")
     if not n_faults:
         rig = a_rig(
             chance,
             chance.choice(["approximate_time", "approximate_time_eager", "exact_time", "latest_time"]),
             seconds=_HEALTHY_S,
+            began=began,
         )
         _stall(rig)
-        return Drawn(seed, (), rig, (), _HEALTHY_S, _looks(chance, _HEALTHY_S))
+        return Drawn(seed, (), rig, (), _HEALTHY_S, _looks(chance, _HEALTHY_S), rig)
     truths: tuple[Truth, ...] = ()
     for attempt in count():
         if not attempt % _ATTEMPTS:
             # Some kinds do not go together.
             names = tuple(chance.sample(list(kinds), min(n_faults, len(kinds))))
-        rig, truths = _faulty(chance, [KINDS[each] for each in names])
+        rig, well, truths = _faulty(chance, [KINDS[each] for each in names], midway, began)
         if truths:
             break
     if "stalls" not in names:
@@ -123,28 +168,34 @@ def drawn(seed: int, kinds: Sequence[str], n_faults: int) -> Drawn:
     late = sum(end - begin for begin, end in rig.stops)
     truths = tuple(replace(each, seen=each.seen + late) for each in truths)
     seconds = max(each.seen for each in truths) + IN_TIME_S + _GRACE_S
-    return Drawn(seed, names, rig, truths, seconds, _looks(chance, seconds))
+    return Drawn(seed, names, rig, truths, seconds, _looks(chance, seconds), well)
 
 
-def _faulty(chance: random.Random, kinds: list[Kind]) -> tuple[Rig, tuple[Truth, ...]]:
+def _faulty(
+    chance: random.Random, kinds: list[Kind], midway: tuple[float, float], began: int
+) -> tuple[Rig, Rig, tuple[Truth, ...]]:
+    """Return a rig with these faults, the rig without them, and what is true: nothing where one does no harm."""
     policies = [each for each in kinds[0].policies if all(each in of.policies for of in kinds)]
     if not policies:
-        return a_rig(chance, "approximate_time"), ()
+        rig = a_rig(chance, "approximate_time")
+        return rig, rig, ()
     policy = chance.choice(policies)
-    rig = a_rig(chance, policy, same_rate=any(each.same_rate for each in kinds))
+    rig = a_rig(chance, policy, same_rate=any(each.same_rate for each in kinds), began=began)
+    well = replace(rig, flows=[replace(each) for each in rig.flows], options=dict(rig.options))
     truths = []
     for kind in kinds:
         if not all(len(each.true) for each in rig.flows):
             # Of what does not come, nothing else can be seen.
-            return rig, ()
+            return rig, well, ()
         rig.begin = 0.0
         if chance.random() < kind.midway:
-            rig.begin = 6 + 10 * chance.random() + 8 * rig.slowest / S
+            first, last = midway
+            rig.begin = first + (last - first) * chance.random() + 8 * rig.slowest / S
         truth = kind.draw(rig)
         if truth is None or truth.seen + IN_TIME_S > LONGEST_S - 5:
-            return rig, ()
+            return rig, well, ()
         truths.append(truth)
-    return rig, tuple(truths)
+    return rig, well, tuple(truths)
 
 
 def _stall(rig: Rig) -> None:
@@ -168,25 +219,15 @@ class _HeardEnoughError(Exception):
 
 def play(draw: Drawn) -> Result:
     """Play a draw until its first sentence, or to its end."""
-    result = Result(draw, Score.NOTHING)
+    result = Result(draw)
 
     def hears(second: float, facts: GroupFacts, found: tuple[Finding, ...], remarks: list[Remark]) -> None:
         shown = explanation(with_ok(facts, found))
-        text = _sentence(shown)
-        if not result.said or result.said[-1][1] != text:
-            result.said.append((second, text))
         if result.logged is None and any(each.severity is not Severity.OK for each in remarks):
             result.logged = second
-        if shown.severity is Severity.OK or shown.code is Code.STARTING or _is_of_stall(draw, shown, second):
-            return
-        result.lasted += 1.03
-        result.first = result.first or (second, shown)
-        if draw.truths and not _is_open(facts, shown):
-            result.first = second, shown
-            # What has only just begun may be less than it will be.
-            fits = [_fit(draw, truth, second, shown) for truth in draw.truths if second < truth.seen]
-            if (Score.HALF, "size") not in fits:
-                raise _HeardEnoughError
+        awaits = facts.suggester is not None and facts.suggester.awaits((shown.code, shown.input))
+        if result.hears(second, shown, is_open=awaits):
+            raise _HeardEnoughError
 
     with contextlib.suppress(_HeardEnoughError):
         run(
@@ -194,31 +235,24 @@ def play(draw: Drawn) -> Result:
             seconds=int(draw.seconds) + 1,
             options=draw.rig.options,
             stops=draw.rig.stops,
-            publishers=_publishers(draw.rig.flows),
+            publishers=publishers_of(draw.rig.flows),
             looks=draw.looks,
             hears=hears,
         )
-    if not draw.truths:
-        result.score = Score.OTHER if result.first else Score.TOLD
-    elif result.first is not None:
-        _judge(result)
+    truth = result.judge()
+    if result.first is not None and result.is_told and truth is not None and truth.moments:
+        result.cure = _wrong_with_cure(draw, result.first[1])
     return result
 
 
-def _is_open(facts: GroupFacts, finding: Finding) -> bool:
-    """Whether it says itself that more will be known soon, or what it suggests is still to be tried."""
-    awaits = facts.suggester is not None and facts.suggester.awaits((finding.code, finding.input))
-    return _NOT_YET in _sentence(finding) or awaits
-
-
-def _publishers(flows: Sequence[Flow]):
+def publishers_of(flows: Sequence[Flow]):
     by_topic = defaultdict(list)
     for each in flows:
         by_topic[each.topic].append(each)
     return lambda topic, second: tuple(each.endpoint for each in by_topic[topic] if each.shown(second))
 
 
-def _is_of_stall(draw: Drawn, finding: Finding, second: float) -> bool:
+def is_of_stall(draw: Drawn, finding: Finding, second: float) -> bool:
     if finding.code is not Code.TOO_SLOW or "stalls" in draw.kinds:
         return False
     return any(end - begin > 0.4 and begin <= second < end + _STALL_TOLD_S for begin, end in draw.rig.stops)
@@ -228,17 +262,7 @@ def _sentence(finding: Finding) -> str:
     return f"{finding.code.value}: {finding.text}" + (f"; {finding.suggestion}" if finding.suggestion else "")
 
 
-def _judge(result: Result) -> None:
-    assert result.first is not None
-    second, finding = result.first
-    scores = [_fit(result.drawn, truth, second, finding) for truth in result.drawn.truths]
-    result.score, result.why = min(scores, key=lambda each: list(Score).index(each[0]))
-    truth = result.drawn.truths[scores.index((result.score, result.why))]
-    if result.score in (Score.TOLD, Score.LATE) and truth.moments:
-        result.cure = _wrong_with_cure(result.drawn, finding)
-
-
-def _fit(draw: Drawn, truth: Truth, second: float, finding: Finding) -> tuple[Score, str]:
+def fit(draw: Drawn, truth: Truth, second: float, finding: Finding) -> tuple[Score, str]:
     topics = [topic.topic for topic in draw.config.topics]
     if finding.code.value not in truth.codes:
         return Score.OTHER, finding.code.value
@@ -302,7 +326,7 @@ def _wrong_with(draw: Drawn, text: str) -> str | None:
         config = group_of(sources, options)
     except ConfigError as error:
         return f"not a valid file: {error}"
-    sets = list(_sets_of(draw, config))
+    sets = list(sets_of(draw, config))
     possible = len(spans(draw.rig, by=lambda each: each.true))
     # By the truth, what was measured together lies as near as it did in the rig that was well.
     most = max(draw.rig.slop, draw.rig.width)
@@ -312,12 +336,13 @@ def _wrong_with(draw: Drawn, text: str) -> str | None:
     return None if right >= 0.98 * len(sets) else f"{right} of {len(sets)} sets are of one moment"
 
 
-def _sets_of(draw: Drawn, config: GroupConfig) -> Iterator[int]:
-    """Give the true span of each set that an engine gives of all messages."""
+def sets_of(draw: Drawn, config: GroupConfig, until: float = LONGEST_S) -> Iterator[int]:
+    """Give the true span of each set that an engine gives of the messages that come until then."""
     came = [
         (int(at), index, int(stamp), int(true))
         for index, each in enumerate(draw.rig.flows)
         for at, stamp, true in zip(each.received, each.stamps, each.true, strict=True)
+        if at <= until * S
     ]
     given: list[int] = []
 
@@ -329,8 +354,8 @@ def _sets_of(draw: Drawn, config: GroupConfig) -> Iterator[int]:
 
     driver = EngineDriver(config, take)
     for at, index, stamp, true in sorted(came):
-        driver.add(Message(index, stamp, true), now=BEGAN + at)
-    driver.finish(BEGAN + round(draw.seconds * S))
+        driver.add(Message(index, stamp, true), now=draw.rig.began + at)
+    driver.finish(draw.rig.began + round(min(until, draw.seconds) * S))
     yield from given
 
 
@@ -339,7 +364,7 @@ def described(draw: Drawn) -> str:
     lines = [f"seed {draw.seed}: {' and '.join(draw.kinds) or 'well'}, from {draw.rig.begin:.1f} s; {draw.rig.options}"]
     lines += [f"  the relay stands still from {begin:.1f} to {end:.1f} s" for begin, end in draw.rig.stops]
     for each in draw.rig.flows:
-        first = ", ".join(f"{(stamp - BEGAN) / S:.6f}" for stamp in each.stamps[:3])
+        first = ", ".join(f"{(stamp - draw.rig.began) / S:.6f}" for stamp in each.stamps[:3])
         lines.append(
             f"  {each.topic} at {each.hz:.3g} Hz, {each.lateness / 1e6:.3g} ms late, jitter {each.jitter / 1e6:.3g} ms"
             f"{'' if each.required else ', optional'}; stamps {first} ... at {np.round(each.true[:1] / S, 6)}"

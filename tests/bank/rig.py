@@ -81,6 +81,8 @@ class Rig:
     options: dict[str, Any]
     begin: float = 0.0
     """When the fault begins: 0 if it was there before the relay came."""
+    began: int = BEGAN
+    """Second 0 by the machine's clock."""
     stops: list[tuple[float, float]] = field(default_factory=list)
 
     @property
@@ -116,7 +118,9 @@ def spans(
     return found
 
 
-def a_rig(chance: random.Random, policy: str, *, same_rate: bool = False, seconds: float = LONGEST_S) -> Rig:
+def a_rig(
+    chance: random.Random, policy: str, *, same_rate: bool = False, seconds: float = LONGEST_S, began: int = BEGAN
+) -> Rig:
     """Draw a rig that is well."""
     n_inputs = chance.choice([2, 2, 2, 3, 3])
     slow_hz = min(100.0, 10 ** chance.uniform(-0.7, 2.2))
@@ -144,8 +148,8 @@ def a_rig(chance: random.Random, policy: str, *, same_rate: bool = False, second
         )
         if is_triggered and wobble == 0 and ratio == 1:
             true = np.round(true)
-        flows.append(_flow(chance, rng, topic, hz, true.astype(np.int64)))
-    rig = Rig(chance, flows, 0, 0, {})
+        flows.append(_flow(chance, rng, topic, hz, true.astype(np.int64), began=began))
+    rig = Rig(chance, flows, 0, 0, {}, began=began)
     rig.width = int(spans(rig).max(initial=0))
     rig.slop = max(round(rig.width * chance.uniform(1.2, 3)), chance.choice([1_000_000, 5_000_000, 10_000_000]))
     if chance.random() < 0.3:
@@ -155,13 +159,13 @@ def a_rig(chance: random.Random, policy: str, *, same_rate: bool = False, second
     return rig
 
 
-def _flow(chance: random.Random, rng: np.random.Generator, topic: str, hz: float, true: Times) -> Flow:
+def _flow(chance: random.Random, rng: np.random.Generator, topic: str, hz: float, true: Times, *, began: int) -> Flow:
     delay = min(10 ** chance.uniform(-0.5, 2), 400 / hz) * 1_000_000
     jitter = min(10 ** chance.uniform(-2, 1.3), 200 / hz) * 1_000_000
     shape = chance.choice([1.0, 1.0, 2.0])
     late = delay + rng.gamma(shape, jitter / shape, len(true))
     received = np.maximum.accumulate((true + late).astype(np.int64))
-    return Flow(topic, hz, true, true + BEGAN, received, delay + jitter, jitter)
+    return Flow(topic, hz, true, true + began, received, delay + jitter, jitter)
 
 
 def _options(rig: Rig, policy: str) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from math import sqrt
 import pytest
 
 from tests.bank.kinds import KINDS
+from tests.bank.looks import look, names_the_cause
 from tests.bank.play import Score, drawn, play
 from tests.faults.extent import chosen
 
@@ -13,6 +14,13 @@ from tests.faults.extent import chosen
 _TOLD = 0.87
 _WELL = 0.99
 _CURED = 0.96
+# Of groups that lack sets: those that `observe` and `doctor` do not call healthy.
+_STOPPED = 0.985
+# Of faults that could be seen by then: those that both name.
+_NAMED = 0.87
+_LOOK_S = 10
+# A fault that is not there from the start begins while they look.
+_MEANWHILE = (1, 4)
 _FIRST = time.time_ns() // 1_000_000_000 % 1_000_000_000
 
 
@@ -30,6 +38,26 @@ def test_the_first_sentence_names_the_fault_that_was_drawn():
     offered = [each for each in told if each.cure != "nothing offered" and any(of.moments for of in each.drawn.truths)]
     failed = [(each.drawn.seed, each.drawn.kinds, each.cure) for each in offered if each.cure]
     assert len(failed) <= (1 - _least(_CURED, len(offered))) * len(offered), failed
+
+
+@pytest.mark.long
+def test_who_looks_for_10_s_calls_no_group_healthy_that_lacks_sets_and_names_the_same_cause(figures):
+    count = chosen(short=60, long=1000)
+    draws = [drawn(seed, tuple(KINDS), 1, midway=_MEANWHILE) for seed in range(_FIRST, _FIRST + count)]
+    looks = [(draw, look(draw, _LOOK_S)) for draw in draws]
+    short = [(draw, each) for draw, each in looks if each.is_short]
+    passed = [(draw.seed, draw.kinds, each.left, each.possible) for draw, each in short if each.is_ok]
+    named = [(draw, is_named) for draw, each in looks if (is_named := names_the_cause(draw, each)) is not None]
+    missed = [(draw.seed, draw.kinds) for draw, is_named in named if not is_named]
+    figures(
+        f"{len(passed)} of {len(short)} groups that lacked sets passed for healthy after {_LOOK_S} s; of {len(named)}"
+        f" faults that could be seen by then, {len(named) - len(missed)} were named"
+    )
+    # Both commands say the same, and of the same cause.
+    assert [draw.seed for draw, each in looks if each.is_ok is bool(each.diagnosed)] == []
+    assert [draw.seed for draw, each in looks if each.said.code.value not in each.diagnosed and not each.is_ok] == []
+    assert len(passed) <= (1 - _least(_STOPPED, len(short))) * len(short), passed
+    assert len(missed) <= (1 - _least(_NAMED, len(named))) * len(named), missed
 
 
 @pytest.mark.long

@@ -1,7 +1,9 @@
 """What `observe` ends with, by the reports of its groups."""
 
 from syncrelay.explain import GroupReport, judge
+from syncrelay.relay.relay import is_early
 from syncrelay.top.observed import unhealthy
+from tests.explain.scenario import Source, always, nothing, run
 from tests.explain.support.groups import NOW, S, a_group, an_input
 
 
@@ -21,3 +23,23 @@ def test_what_decides_against_a_group_is_said_and_counted():
         "front produced no set in 1 s, which is too short to tell why: observe it for longer",
         "rear could not be evaluated: see the log",
     ]
+
+
+def _looked(hz, *, sends=always, clock=nothing) -> GroupReport:
+    rig = Source("/camera", hz, sends=sends, clock=clock), Source("/lidar", hz)
+    told = run(*rig, seconds=10, options={"slop": "20ms"})
+    return GroupReport(told.facts, told.found[-1][1])
+
+
+def test_a_group_of_which_some_of_the_few_possible_sets_left_is_not_called_healthy():
+    few = _looked(0.4, clock=lambda second: 0.3 if 2 < second < 3 else 0)
+    assert unhealthy([few], 10) == [
+        "front produced 2 of 3 possible sets so far, which is too soon to judge: observe it for longer"
+    ]
+
+
+def test_a_look_goes_on_while_sets_have_just_stopped_and_nothing_says_why():
+    assert not is_early(_looked(10))
+    assert is_early(_looked(10, sends=lambda second: second < 8.6))
+    # That an input is silent is known by then.
+    assert not is_early(_looked(10, sends=lambda second: second < 3))
