@@ -3,7 +3,8 @@
 It takes commands on stdin, one a line, and answers each with a line on stdout when it is done:
 
     match N             every publisher has at least N matched subscriptions
-    play SPEED FILE     the frames of FILE were published, paced by their times
+    play SPEED FILE     the frames of FILE were published, paced by their times; where SPEED is `clock`, at these
+                        times by the machine's clock
     stop                what it plays was ended
     acknowledge         all that was published is acknowledged by all subscriptions, which may take 3 s: only
                         Fast DDS's periodic heartbeat asks for it
@@ -56,7 +57,7 @@ def main() -> None:
         if command == "match":
             _match(publishers, int(words[0]))
         elif command == "play":
-            _play(publishers, float(words[0]), Path(words[1].rstrip("\n")))
+            _play(publishers, words[0], Path(words[1].rstrip("\n")))
         elif command == "acknowledge":
             _acknowledge(publishers)
         print(command, flush=True)  # noqa: T201  the answer
@@ -85,9 +86,11 @@ def _match(publishers: dict[str, Publisher], subscriptions: int) -> None:
         time.sleep(_POLL_S)
 
 
-def _play(publishers: dict[str, Publisher], speed: float, path: Path) -> None:
+def _play(publishers: dict[str, Publisher], pace: str, path: Path) -> None:
     recording = frames.read(path)
-    began = time.monotonic()
+    began, speed = time.monotonic(), 1.0 if pace == "clock" else float(pace)
+    if pace == "clock":
+        began += (recording[0].time - time.time_ns()) / 1e9
     for frame in recording:
         due = began + (frame.time - recording[0].time) / 1e9 / speed
         while (left := due - time.monotonic()) > 0:

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -47,11 +48,19 @@ class Player:
 
     def start(self, recording: Sequence[Frame], *, speed: float = 10) -> None:
         """Begin to play at a multiple of the recording's own pace; `finish` waits for the end."""
+        self._start(recording, f"{speed}")
+        self._span_s = (recording[-1].time - recording[0].time) / 1e9 / speed
+
+    def start_by_clock(self, recording: Sequence[Frame]) -> None:
+        """Play each frame at its time by the machine's clock; `finish` waits for the end."""
+        self._start(recording, "clock")
+        self._span_s = max(0.0, recording[-1].time / 1e9 - time.time())
+
+    def _start(self, recording: Sequence[Frame], pace: str) -> None:
         self._plays += 1
         path = self._folder / f"{self.process.name}-{self._plays}.frames"
         frames.write(path, recording)
-        self.process.tell(f"play {speed} {path}")
-        self._span_s = (recording[-1].time - recording[0].time) / 1e9 / speed
+        self.process.tell(f"play {pace} {path}")
 
     def finished(self) -> bool:
         return self.process.stdout.count("play") == self._plays
