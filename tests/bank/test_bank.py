@@ -15,7 +15,7 @@ _TOLD = 0.87
 _WELL = 0.99
 _CURED = 0.96
 # Of groups that lack sets: those that `observe` and `doctor` do not call healthy.
-_STOPPED = 0.985
+_STOPPED = 0.98
 # Of faults that could be seen by then: those that both name.
 _NAMED = 0.87
 _LOOK_S = 10
