@@ -27,7 +27,7 @@ _ALIKE: Final = 0.25
 # Levels are those of so many looks, and known from so few: those of less lie in a wider range, by this many to as many.
 _LEVELS: Final = 40
 _FEWEST: Final = 3
-_KNOWN_OF: Final = 8
+_KNOWN_OF: Final = 12
 # Another level is as far beyond the range of the levels as that is wide, and by this.
 _LEAST: Final = 2_000_000
 # It is one if so many looks agree; what so many do not agree on is no level.
@@ -96,7 +96,7 @@ class StampSteps:
             levels.append(least)
             return None
         low, high = self._range or (min(levels), max(levels))
-        margin = (high - low) * max(1, _KNOWN_OF // len(levels)) + _LEAST
+        margin = (high - low) * max(1, _KNOWN_OF / len(levels)) + _LEAST
         side = (least > high + margin) - (least < low - margin)
         if not side or (self._off and (self._off[-1] > high) is not (side > 0)):
             self._off.clear()
