@@ -105,6 +105,11 @@ class DeviceClock:
         self._rise: _Rise | None = None
         self._before: _Mapped | None = None
 
+    @property
+    def rate(self) -> float:
+        """How much the delays grow a second, without unit: positive where the device's clock runs slow."""
+        return self._line.rate
+
     def host_time(self, stamp: int, received: int) -> int:
         """Return the host's time of a stamp that was received now. A stamp of 0 was never set, and stays."""
         if not stamp:

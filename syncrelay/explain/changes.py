@@ -21,12 +21,12 @@ class Change(NamedTuple):
     def parsed(self) -> Any:
         """The value as the group has it."""
         match self.key:
-            case "policy":
+            case "policy" | "clock" | "stamp":
                 return self.value
             case "queue_size":
                 return int(self.value)
             case _:
-                # A policy's tolerance, whatever its key, `max_wait` or `offset`.
+                # A policy's tolerance, whatever its key, `max_wait`, `offset` or `delay`.
                 return parse_duration(self.value)
 
 
@@ -51,5 +51,14 @@ def changed(config: GroupConfig, changes: Changes) -> GroupConfig:
         options = options.model_copy(update=values)
     for each in changes:
         if each.input is not None:
-            topics[each.input] = replace(topics[each.input], offset_ns=each.parsed)
+            topic, value = topics[each.input], each.parsed
+            match each.key:
+                case "clock":
+                    topics[each.input] = replace(topic, is_of_device=value == "device")
+                case "stamp":
+                    topics[each.input] = replace(topic, stamp=value)
+                case "delay":
+                    topics[each.input] = replace(topic, delay_ns=value)
+                case _:
+                    topics[each.input] = replace(topic, offset_ns=value)
     return replace(config, options=options, topics=tuple(topics))

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final, NamedTuple, TypeAlias
 
+from syncrelay.explain.changes import Changes
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
 
@@ -95,3 +96,13 @@ def counted(count: int, fed: int) -> str:
 def nodes(an_input: InputFacts) -> str:
     """Return the names of those who publish an input."""
     return " and ".join(dict.fromkeys(each.node for each in an_input.graph.publishers)) or "its publisher"
+
+
+def written(facts: GroupFacts, changes: Changes) -> str:
+    """Return changes as they stand in the file, with the input that they are for behind the last of those of one."""
+    parts = []
+    for each, after in zip(changes, (*changes[1:], None), strict=True):
+        is_last = each.input is not None and (after is None or after.input != each.input)
+        where = f" at {facts.inputs[each.input].name}" if is_last and each.input is not None else ""
+        parts.append(f"`{each.key}: {each.value}`{where}")
+    return " and ".join(parts)

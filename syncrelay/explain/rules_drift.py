@@ -6,9 +6,11 @@ from typing import Final
 from syncrelay.config import Distance
 from syncrelay.explain import words
 from syncrelay.explain.clocks import Drift, apart
+from syncrelay.explain.codes import Code
 from syncrelay.explain.epochs import OTHER_RATE
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import SECOND, Fault, Found
+from syncrelay.explain.other_stamps import offered_stamps
 
 # A drift is reported after this much change, over at least this time, and only if the delays bend far less than that.
 _DRIFTED: Final = 5_000_000
@@ -104,7 +106,8 @@ def clock_drift(facts: GroupFacts) -> Found:
     gone = abs(found.slope) * (facts.figures.now - facts.figures.began)
     yield Fault(
         text,
-        "synchronize their clocks with PTP or chrony, or have their drivers stamp with the host's time",
+        "synchronize their clocks with PTP or chrony, or have their drivers stamp with the host's time"
+        + offered_stamps(facts, Code.CLOCK_DRIFT, odd),
         input=odd if is_evident else None,
         # A clock that is off by a few ppm is not why stamps lie far apart today.
         explains=facts.tolerance is not None and gone >= _MATTERS * facts.tolerance.ns,

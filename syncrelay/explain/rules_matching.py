@@ -11,12 +11,12 @@ from syncrelay.config import Distance, Tolerance
 from syncrelay.config.units import parse_duration
 from syncrelay.config.wording import all_of
 from syncrelay.explain import words
-from syncrelay.explain.changes import Changes
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.facts import GroupFacts, InputFacts
-from syncrelay.explain.findings import SECOND, Fault, Found, absence, counted, nodes
+from syncrelay.explain.findings import SECOND, Fault, Found, absence, counted, nodes, written
 from syncrelay.explain.nearest import quantile, shifted, signed_distances
+from syncrelay.explain.other_stamps import by_other_stamps
 from syncrelay.explain.rules_flow import fates
 from syncrelay.explain.rules_stamps import offered_offset, other_clock
 from syncrelay.explain.standing import Standing
@@ -300,9 +300,9 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
 
 
 def _in_time(index: int, trials: Trials) -> Verdict:
-    """Find an offset for an optional input of another clock."""
+    """Find an offset for an optional input of another clock, or other stamps."""
     offset = trials.clock_offset(index)
-    tried = None if offset is None else trials.by_offset(offset, index)
+    tried = (None if offset is None else trials.by_offset(offset, index)) or by_other_stamps(trials, index, index)
     return Verdict(() if tried is None else (tried,))
 
 
@@ -393,17 +393,10 @@ def _advice(facts: GroupFacts, verdict: Verdict, optional: str | None = None) ->
     first, *others = verdict.tried
     gives = f"which would give {first.given} of {first.possible} {sets} (now {first.now})"
     more = "".join(
-        f", or, if both are measured at the same time, {_written(facts, each.changes)}, which would give {each.given}"
+        f", or, if both are measured at the same time, {written(facts, each.changes)}, which would give {each.given}"
         for each in others
     )
-    return f"write {_written(facts, first.changes)}, {gives}{more}"
-
-
-def _written(facts: GroupFacts, changes: Changes) -> str:
-    return " and ".join(
-        f"`{each.key}: {each.value}`" + ("" if each.input is None else f" at {facts.inputs[each.input].name}")
-        for each in changes
-    )
+    return f"write {written(facts, first.changes)}, {gives}{more}"
 
 
 def _or(advice: str | None) -> str:

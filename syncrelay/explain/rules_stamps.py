@@ -13,6 +13,7 @@ from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.epochs import BOOT_NS, time_scale
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Fault, Found, blocks, counted, nodes
+from syncrelay.explain.other_stamps import offered_stamps
 from syncrelay.explain.rules_flow import waited_for_relay
 from syncrelay.explain.standing import Standing
 from syncrelay.explain.steps import STEP_NS
@@ -120,12 +121,12 @@ def other_clock(facts: GroupFacts) -> Found:
     if scale := time_scale(newest, behind):
         what, exactly = scale
         text = f"stamps of {an_input.name}{shifted} {apart_by}: they {what}"
-        instead = _or_by_arrival(facts, an_input) if abs(behind) > BOOT_NS else _or_offset(facts, odd, exactly + offset)
-        suggestion = f"have {nodes(an_input)} stamp with the host's time{instead}"
+        exact = None if abs(behind) > BOOT_NS else exactly + offset
+        suggestion = f"have {nodes(an_input)} stamp with the host's time{_or_mapped(facts, odd, exact)}"
     else:
         text = f"stamps of {an_input.name}{shifted} {apart_by}"
         suggestion = (
-            f"synchronize the clocks of their machines{_or_offset(facts, odd, behind + offset)}"
+            f"synchronize the clocks of their machines{_or_mapped(facts, odd, behind + offset)}"
             f"{_wait_for_it(facts, odd, behind)}"
         )
     yield Fault(text, suggestion, blocks(facts, an_input), input=odd)
@@ -152,7 +153,7 @@ def _misread(facts: GroupFacts) -> Found:
         )
         yield Fault(
             f"stamps of {an_input.name} {reading.what}",
-            f"check that {nodes(an_input)} {check}{_or_by_arrival(facts, an_input)}",
+            f"check that {nodes(an_input)} {check}{_or_mapped(facts, index)}",
             blocks(facts, an_input),
             input=index,
         )
@@ -180,9 +181,15 @@ def offered_offset(facts: GroupFacts, code: Code, index: int, by: int) -> str:
     return f"write `offset: {change.value}` at {name}, {gives}"
 
 
-def _or_offset(facts: GroupFacts, index: int, by: int) -> str:
-    advice = offered_offset(facts, Code.OTHER_CLOCK, index, by)
-    return f", or {advice}" if advice else ""
+def _or_mapped(facts: GroupFacts, index: int, by: int | None = None) -> str:
+    """Offer an offset where stamps are off by a constant that is known, else to have them mapped."""
+    if by is None and facts.suggester is None:
+        return _or_by_arrival(facts, facts.inputs[index])
+    advice = "" if by is None else offered_offset(facts, Code.OTHER_CLOCK, index, by)
+    # A clock that was set may be set again.
+    if advice and not facts.inputs[index].figures.stepped:
+        return f", or {advice}"
+    return offered_stamps(facts, Code.OTHER_CLOCK, index) or (f", or {advice}" if advice else "")
 
 
 def _wait_for_it(facts: GroupFacts, index: int, behind: int) -> str:
@@ -263,7 +270,7 @@ def clock_step(facts: GroupFacts) -> Found:
             yield Fault(
                 f"stamps of {an_input.name} jumped {_forward(step.by)}, {_ago(now, step.at)}"
                 f"{_of_others(facts, index, step.at)}",
-                _SLEW.format(where=f"of {nodes(an_input)}"),
+                _SLEW.format(where=f"of {nodes(an_input)}") + offered_stamps(facts, Code.CLOCK_STEP, index),
                 blocks(facts, an_input),
                 input=index,
             )

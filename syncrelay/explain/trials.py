@@ -4,7 +4,7 @@ One `Trials` answers all questions about a group and a moment, so that a key has
 is counted is sets of one moment: a wider slop that pairs messages of two moments gives more sets, and cures nothing.
 """
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, combinations
@@ -95,6 +95,8 @@ class Trials:
     messages: Callable[[], Iterable[Message]]
     inputs: Sequence[Received]
     is_window: bool
+    by_stamps: dict[Hashable, Tried | None] = field(default_factory=dict)
+    """What other stamps of an input were found to give: see other_stamps."""
     _targets: dict[int | None, PossibleSets | None] = field(default_factory=dict)
     _runs: dict[Changes, dict[int | None, _Run]] = field(default_factory=dict)
 

@@ -23,6 +23,7 @@ class Row(NamedTuple):
     score: Score
     why: str
     cure: str
+    is_cure_tried: bool
     lasted: float
 
 
@@ -30,7 +31,8 @@ def row(kinds: tuple[str, ...], n_faults: int, seed: int) -> Row:
     result = play(drawn(seed, kinds, n_faults))
     first = result.first[1].code.value if result.first else ""
     why = result.why or ("" if result.score is Score.TOLD else first)
-    return Row(seed, " + ".join(result.drawn.kinds) or "well", result.score, why, result.cure or "", result.lasted)
+    kind, tried = " + ".join(result.drawn.kinds) or "well", any(each.moments for each in result.drawn.truths)
+    return Row(seed, kind, result.score, why, result.cure or "", tried, result.lasted)
 
 
 def main() -> int:
@@ -68,10 +70,11 @@ def _table(rows: list[Row]) -> None:
     for kind in names:
         _say(_counted(kind, kinds[kind]))
     _say(_counted("all", rows))
-    offered = [each for each in rows if each.score in (Score.TOLD, Score.LATE) and each.cure != "nothing offered"]
+    told = [each for each in rows if each.score in (Score.TOLD, Score.LATE) and each.is_cure_tried]
+    offered = [each for each in told if each.cure != "nothing offered"]
     wrong = [each for each in offered if each.cure]
     fails = "; ".join(f"{each.seed} {each.kind}: {each.cure}" for each in wrong[:12])
-    _say(f"of {len(offered)} that were told, what was offered fails in {len(wrong)}. {fails}")
+    _say(f"of {len(told)} that were told, {len(offered)} were offered a cure, which fails in {len(wrong)}. {fails}")
     if rows[0].kind == "well":
         _say(f"longest false warning: {max(each.lasted for each in rows):.0f} s")
 

@@ -158,7 +158,7 @@ def far_off(rig: Rig) -> Truth | None:
     # What lies whole periods off is a result that takes that long as like as not, as is a trigger that is behind.
     if ("slop" in rig.options and _lost(rig) < 0.95) or (by < 0 and "trigger" in rig.options):
         return None
-    return _truth("other_clock", flow, rig.seen(), (abs(by) * S,))
+    return _truth("other_clock", flow, rig.seen(), (abs(by) * S,), moments="slop" in rig.options)
 
 
 def _is_trigger_at_once(rig: Rig, flow: Flow) -> bool:
@@ -171,7 +171,7 @@ def _time_scale(rig: Rig, by: float, *says: str) -> Truth | None:
     if _is_trigger_at_once(rig, flow):
         return None
     flow.stamps = flow.stamps + round(by * S)
-    return _truth("other_clock", flow, rig.seen(), says=says)
+    return _truth("other_clock", flow, rig.seen(), says=says, moments="slop" in rig.options)
 
 
 @_kind(policies=_ANY)
@@ -201,7 +201,7 @@ def simulated(rig: Rig) -> Truth | None:
     flow = _one(rig)
     factor = rig.chance.choice([1.0, 1.0, rig.chance.uniform(0.2, 0.9), rig.chance.uniform(1.2, 4)])
     flow.stamps = (flow.true * factor + _log(rig, 1, 1000) * S).astype(np.int64)
-    return _truth("other_clock", flow, rig.seen(), says=("simulation",))
+    return _truth("other_clock", flow, rig.seen(), says=("simulation",), moments=True)
 
 
 @_kind()
@@ -255,7 +255,8 @@ def restart_at_0(rig: Rig) -> Truth | None:
     if not of.any():
         return None
     flow.stamps = np.where(of, flow.true - round(rig.begin * S) + 1 * MS, flow.stamps)
-    return _truth("other_clock clock_step time_jump", flow, rig.seen(), says=("boot", "restart", "0"))
+    codes = "other_clock clock_step time_jump"
+    return _truth(codes, flow, rig.seen(), says=("boot", "restart", "0"), moments=True)
 
 
 @_kind(midway=1.0)
@@ -268,7 +269,8 @@ def step(rig: Rig) -> Truth | None:
         return None
     by = _sign(rig) * round(by)
     flow.stamps = np.where(flow.since(rig.begin), flow.stamps + by, flow.stamps)
-    return _truth("clock_step" if abs(by) < S else "clock_step other_clock time_jump", flow, rig.seen(), (abs(by),))
+    codes = "clock_step" if abs(by) < S else "clock_step other_clock time_jump"
+    return _truth(codes, flow, rig.seen(), (abs(by),), moments=True)
 
 
 @_kind(midway=1.0)
@@ -292,7 +294,7 @@ def drift(rig: Rig) -> Truth | None:
     ahead = _log(rig, 0.01, 0.8) * rig.slop * -np.sign(ppm)
     flow.stamps = flow.stamps + (flow.true * ppm * 1e-6 + ahead).astype(np.int64)
     shows = (5 * MS + 4 * max(each.jitter for each in rig.flows)) / (abs(ppm) * 1e-6) / S
-    return _truth("clock_drift", flow, rig.seen(shows), (abs(ppm),), unit="ppm") if shows < 45 else None
+    return _truth("clock_drift", flow, rig.seen(shows), (abs(ppm),), unit="ppm", moments=True) if shows < 45 else None
 
 
 @_kind()

@@ -301,7 +301,7 @@ def _wrong_with_cure(draw: Drawn, finding: Finding) -> str | None:
 
     What is off by seconds may be of another clock or take that long: it says what to write in either case.
     """
-    offers = re.split(r", or |; ", finding.suggestion or "")
+    offers = [each for each in re.split(r", or |; ", finding.suggestion or "") if _OFFER.search(each)] or [""]
     tried = [_wrong_with(draw, each) for each in (offers if finding.code is Code.OTHER_CLOCK else offers[:1])]
     return None if None in tried else tried[-1]
 
@@ -312,10 +312,12 @@ def _wrong_with(draw: Drawn, text: str) -> str | None:
         return "nothing offered"
     group: dict[str, Any] = {}
     topics: dict[str, dict[str, Any]] = defaultdict(dict)
-    for each in offers:
+    topic = None
+    for each in reversed(offers):
         value: Any = int(each["value"]) if each["value"].isdecimal() else each["value"]
-        if each["topic"] and each["key"] in ("offset", "stamp"):
-            topics[each["topic"]][each["key"]] = value
+        topic = each["topic"] or topic
+        if topic and each["key"] in ("offset", "stamp", "clock", "delay"):
+            topics[topic][each["key"]] = value
         else:
             group[each["key"]] = value
     sources = [replace(each, topic_options={**each.topic_options, **topics[each.topic]}) for each in draw.sources]
@@ -326,8 +328,10 @@ def _wrong_with(draw: Drawn, text: str) -> str | None:
         config = group_of(sources, options)
     except ConfigError as error:
         return f"not a valid file: {error}"
-    sets = list(sets_of(draw, config))
-    possible = len(spans(draw.rig, by=lambda each: each.true))
+    # What is offered for what a clock does now is not for what it did before.
+    sets = list(sets_of(draw, config, since=draw.rig.begin))
+    flows = [replace(each, true=each.true[each.since(draw.rig.begin)]) for each in draw.rig.flows]
+    possible = len(spans(draw.rig, flows, by=lambda each: each.true))
     # By the truth, what was measured together lies as near as it did in the rig that was well.
     most = max(draw.rig.slop, draw.rig.width)
     right = sum(span <= 1.05 * most for span in sets)
@@ -336,8 +340,8 @@ def _wrong_with(draw: Drawn, text: str) -> str | None:
     return None if right >= 0.98 * len(sets) else f"{right} of {len(sets)} sets are of one moment"
 
 
-def sets_of(draw: Drawn, config: GroupConfig, until: float = LONGEST_S) -> Iterator[int]:
-    """Give the true span of each set that an engine gives of the messages that come until then."""
+def sets_of(draw: Drawn, config: GroupConfig, since: float = 0.0, until: float = LONGEST_S) -> Iterator[int]:
+    """Give the true span of each set of samples taken since then, of the messages that come until then."""
     came = [
         (int(at), index, int(stamp), int(true))
         for index, each in enumerate(draw.rig.flows)
@@ -350,11 +354,15 @@ def sets_of(draw: Drawn, config: GroupConfig, until: float = LONGEST_S) -> Itera
         for each in outcomes:
             if isinstance(each, Match):
                 true = [message.payload for message in each.messages if message is not None]
-                given.append(max(true) - min(true))
+                if min(true) >= since * S:
+                    given.append(max(true) - min(true))
 
     driver = EngineDriver(config, take)
+    clocks = [topic.device_clock() for topic in config.topics]
     for at, index, stamp, true in sorted(came):
-        driver.add(Message(index, stamp, true), now=draw.rig.began + at)
+        clock, now = clocks[index], draw.rig.began + at
+        by_header = stamp if clock is None else clock.host_time(stamp, now)
+        driver.add(Message(index, now if config.topics[index].stamp == "receive" else by_header, true), now=now)
     driver.finish(draw.rig.began + round(min(until, draw.seconds) * S))
     yield from given
 

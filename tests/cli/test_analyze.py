@@ -1,4 +1,6 @@
 import json
+import random
+import re
 import shlex
 import sys
 
@@ -80,6 +82,29 @@ def test_the_written_file_gives_what_was_promised_and_leaves_nothing_to_change(f
     fits = run_here("analyze", "rig.mcap", "--config", written, "--write", str(new), folder=folder)
     assert (fits.returncode, fits.stderr) == (0, f"syncrelay: no values to change: {new} was not written\n")
     assert not new.exists()
+
+
+@pytest.mark.parametrize("stamped", [lambda ms: ms * (1 - 400e-6), lambda ms: ms - BEGIN / MS + 90_000])
+def test_a_clock_that_drifts_or_counts_from_boot_is_suggested_to_be_mapped_and_then_gives_the_sets(stamped, tmp_path):
+    """A camera and a device, which is received 6 to 9 ms after it measured."""
+    chance = random.Random(1)
+    camera = at("/camera", *(n * 100 for n in range(600)))
+    sent = [(n * 100, BEGIN + round((n * 100 + 6 + 3 * chance.random()) * MS)) for n in range(600)]
+    lidar = [Frame("/lidar", VECTOR, received, vector(BEGIN + round(stamped(ms) * MS))) for ms, received in sent]
+    bag, written = write_mcap(tmp_path / "device.mcap", merged(camera, lidar)).name, str(tmp_path / "better.yaml")
+    group = {"policy": "approximate_time", "slop": "15ms", "topics": inputs(dict.fromkeys(_TOPICS, VECTOR))}
+    (tmp_path / "f.yaml").write_text(config({"front": group}))
+    done = run_here("analyze", bag, "--config", "f.yaml", "--write", written, folder=tmp_path)
+    assert done.returncode == 0
+    assert "        - topic: /lidar\n            clock: device\n" in done.stdout
+    assert ", or write `clock: device` at /lidar, which would give " in done.stdout
+    assert run_here("validate", written, folder=tmp_path).returncode == 0
+    replayed = run_here("replay", bag, "--config", written, folder=tmp_path)
+    promised = re.search(r"suggestion: \d+ -> (\d+) of", done.stdout)
+    assert promised
+    assert read_summary(replayed.stdout)["front"].sets >= int(promised[1]) > 590
+    mended = run_here("analyze", bag, "--config", written, folder=tmp_path)
+    assert "suggestion: none, no better values were found" in mended.stdout
 
 
 def test_topics_without_a_file_get_one(folder, tmp_path):

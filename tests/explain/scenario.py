@@ -270,6 +270,7 @@ class _Relay:
         self._settling = [SettlingType() if topic.type is None else None for topic in config.topics]
         self._taken: list[Endpoint | None] = [None] * len(config.topics)
         self._driver = EngineDriver(config, self._leave)
+        self._clocks = [topic.device_clock() for topic in config.topics]
         self._watch = GroupWatch(config, began=BEGAN)
         self._judge = Judge()
         self._log = FindingLog()
@@ -289,6 +290,8 @@ class _Relay:
         if stamp is None:
             self._driver.reject(index, received, now=now)
             return
+        if (clock := self._clocks[index]) is not None:
+            stamp = clock.host_time(stamp, received)
         self._arrived[index].append((stamp, received))
         message = Message(index, stamp, received)
         if self._pause_at(now) is None:

@@ -1,6 +1,7 @@
 """Suggestions: each was tried on the messages that came, cures what it is said of, and gives what it promises."""
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -25,14 +26,19 @@ _VALUE = re.compile(r"`(\w+): ([^`]+)`(?: at (/\w+))?")
 def offers(finding: Finding) -> list[tuple[list[tuple[str, str, str]], int]]:
     """What a finding suggests to write, and how many sets that would give."""
     found = _VALUES.findall(finding.suggestion or "")
-    return [(_VALUE.findall(values), int(promised)) for values, promised in found]
+    return [(_with_topics(_VALUE.findall(values)), int(promised)) for values, promised in found]
+
+
+def _with_topics(values: list[tuple[str, str, str]]) -> list[tuple[str, str, str]]:
+    """Of several values for one topic, the last names it."""
+    return [(key, value, values[-1][2] if key == "clock" else topic) for key, value, topic in values]
 
 
 def written(sources: list[Source], options: dict, values: list[tuple[str, str, str]]):
     """The rig with these values in its file."""
     options = {**options, **{key: yaml_value(value) for key, value, topic in values if not topic}}
-    offsets = {topic: {key: value} for key, value, topic in values if topic}
-    return [replace(each, topic_options=each.topic_options | offsets.get(each.topic, {})) for each in sources], options
+    of_topic = [(each, {key: value for key, value, topic in values if topic == each.topic}) for each in sources]
+    return [replace(each, topic_options=each.topic_options | written) for each, written in of_topic], options
 
 
 def yaml_value(value: str):
@@ -111,6 +117,64 @@ def test_no_offset_is_offered_for_another_clock_whose_stamps_would_not_match_by_
     assert told.codes == {"other_clock"}
     assert told.first.text.endswith("synchronize the clocks of their machines")
     assert cured == []
+
+
+def drifting(ppm: float) -> Callable[[float], float]:
+    return lambda second: second * ppm * 1e-6
+
+
+@pytest.mark.parametrize("ppm", [-800, 800])
+def test_a_clock_that_drifts_is_offered_to_be_mapped_and_then_no_set_is_lost(ppm: int):
+    imu = Source("/imu", hz=10, delay_jitter_ms=0.5, clock=drifting(ppm))
+    told, cured = rig(CAMERA, LIDAR, imu, seconds=40, slop="12ms")
+    assert told.codes == {"clock_drift"}
+    assert told.facts.figures.share.left < told.facts.figures.share.possible
+    assert [values for values, _ in offers(cured[0][0])] == [[("clock", "device", "/imu")]]
+    assert_cured(cured, offered=1)
+
+
+def test_stamps_that_count_from_boot_are_offered_to_be_mapped_with_the_delay_that_they_then_have():
+    imu = Source("/imu", hz=10, delay_ms=42, delay_jitter_ms=0.5, stamp=lambda stamp: stamp - BEGAN + 300 * S)
+    told, cured = rig(CAMERA, LIDAR, imu, slop="5ms")
+    assert told.codes == {"other_clock"}
+    (((clock, delay), _),) = offers(cured[0][0])
+    assert clock == ("clock", "device", "/imu")
+    assert delay[0::2] == ("delay", "/imu")
+    assert 39 < float(delay[1].removesuffix("ms")) < 43
+    assert_cured(cured, offered=1)
+
+
+def test_an_offset_is_kept_where_it_is_known_and_a_clock_that_was_set_is_offered_to_be_mapped():
+    constant, _ = rig(CAMERA, LIDAR, Source("/imu", hz=10, clock=lambda _: 5.25), slop="20ms")
+    assert "write `offset: -5.25s` at /imu, which would give" in (constant.found[-1][1][0].suggestion or "")
+    _, cured = rig(CAMERA, LIDAR, Source("/imu", hz=10, clock=lambda s: 5.25 * (s > 15)), slop="20ms")
+    assert {each for finding, _, _ in cured for values, _ in offers(finding) for each in values} == {
+        ("clock", "device", "/imu")
+    }
+    assert_cured(cured, offered=1)
+
+
+@pytest.mark.parametrize("stamp", [lambda stamp: BEGAN + (stamp - BEGAN) // 2, lambda stamp: stamp // S * S])
+def test_a_clock_that_cannot_be_followed_is_not_offered_to_be_mapped(stamp):
+    told, _ = rig(CAMERA, LIDAR, Source("/imu", hz=10, stamp=stamp), slop="20ms")
+    assert told.warnings
+    assert "clock: device" not in "".join(each.suggestion or "" for _, found in told.found for each in found)
+
+
+def test_times_of_receipt_are_offered_only_where_they_bring_the_sets():
+    halved = Source("/imu", hz=10, stamp=lambda stamp: BEGAN + (stamp - BEGAN) // 2)
+    told, cured = rig(CAMERA, LIDAR, halved, slop="20ms")
+    assert [values for values, _ in offers(cured[0][0])] == [[("stamp", "receive", "/imu")]]
+    assert_cured(cured, offered=1)
+    late, none = rig(CAMERA, LIDAR, replace(halved, delay_ms=45), slop="20ms")
+    assert late.codes == told.codes
+    assert none == []
+
+
+def test_an_optional_input_of_another_clock_that_drifts_is_offered_to_be_mapped():
+    imu = Source("/imu", hz=10, required=False, clock=lambda second: 5.25 + 1.2e-3 * second)
+    _, cured = rig(CAMERA, LIDAR, imu, slop="5ms", max_wait="100ms")
+    assert [offers(finding)[0][0] for finding, _, _ in cured] == [[("clock", "device", "/imu")]]
 
 
 def test_an_offset_is_offered_for_an_optional_input_of_another_clock():

@@ -7,7 +7,7 @@ from typing import Final
 from syncrelay.config import Config, GroupConfig
 from syncrelay.explain import Arrivals
 from syncrelay.recordings.analysis.analysis import GroupAnalysis, analyze_group, group_of
-from syncrelay.recordings.analysis.streams import Stream
+from syncrelay.recordings.analysis.streams import Mapping, Stream
 
 # Of all groups together, and of each one at least: the analysis takes some seconds for so many.
 _MOST: Final = 50_000
@@ -28,7 +28,10 @@ class LiveStreams:
 
     def streams(self, group: GroupConfig) -> tuple[Stream, ...]:
         """Give a group's messages, a stream for each input."""
-        streams = tuple(Stream(topic.topic, topic.type or "") for topic in group.topics)
+        streams = tuple(
+            Stream(topic.topic, topic.type or "", mapping=Mapping() if topic.is_of_device else None)
+            for topic in group.topics
+        )
         for place, (index, stamp, received) in enumerate(self._last[group.name]):
             streams[index].stamps.append(stamp)
             streams[index].received.append(received)

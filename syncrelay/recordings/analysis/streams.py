@@ -2,14 +2,15 @@
 
 from array import array
 from collections.abc import Hashable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import repeat
 from typing import Final, TypeAlias
 
 import numpy as np
 
-from syncrelay.clock import DeviceClock
+from syncrelay.clock import DeviceClock, Step
 from syncrelay.config import GroupConfig, StampSource
+from syncrelay.explain import UNREADABLE
 from syncrelay.recordings.bag.bindings import GroupBinding
 from syncrelay.recordings.bag.columns import (
     Batch,
@@ -29,6 +30,19 @@ from syncrelay.sync import Message
 _AT_ONCE: Final = 10_000
 
 
+@dataclass(frozen=True, slots=True)
+class Mapping:
+    """How stamps of a device were mapped: as they came, when its clock was set, its last rate and what was taken off.
+
+    Without stamps where a relay had mapped them before they were seen.
+    """
+
+    stamps: "array[int]" = field(default_factory=lambda: array("q"))
+    steps: tuple[Step, ...] = ()
+    rate: float = 0.0
+    delay_ns: int = 0
+
+
 @dataclass(slots=True)
 class Stream:
     """One input's messages as they were received: stamps, times of receipt, places in the whole recording, keys.
@@ -43,6 +57,20 @@ class Stream:
     received: "array[int]" = field(default_factory=lambda: array("q"))
     places: "array[int]" = field(default_factory=lambda: array("q"))
     keys: list[Hashable] | None = None
+    mapping: Mapping | None = None
+
+    def by_device(self, delay_ns: int) -> "Stream":
+        """Give the same messages with their stamps mapped to the host's time, as `clock: device` has it."""
+        steps: list[Step] = []
+        clock = DeviceClock(delay_ns=delay_ns, stepped=steps.append)
+        mapped = array(
+            "q",
+            (
+                stamp if stamp == UNREADABLE else clock.host_time(stamp, received)
+                for stamp, received in zip(self.stamps, self.received, strict=True)
+            ),
+        )
+        return replace(self, stamps=mapped, mapping=Mapping(self.stamps, tuple(steps), clock.rate, delay_ns))
 
     def by_receipt(self) -> "Stream":
         """Give the same messages with the times of receipt for stamps."""
@@ -61,8 +89,8 @@ class Stream:
             self.keys += column.keys or repeat(None, len(column.places))
 
 
-_Wanted: TypeAlias = tuple[str, StampSource, str | None, bool, bool, int]
-_Filled: TypeAlias = list[tuple[Stream, list[tuple[Channel, ReadColumn]], DeviceClock | None]]
+_Wanted: TypeAlias = tuple[str, StampSource, str | None, bool]
+_Filled: TypeAlias = list[tuple[Stream, list[tuple[Channel, ReadColumn]]]]
 
 
 def read_streams(recording: Recording, bindings: Sequence[GroupBinding]) -> tuple[tuple[Stream, ...], ...]:
@@ -72,21 +100,31 @@ def read_streams(recording: Recording, bindings: Sequence[GroupBinding]) -> tupl
     """
     streams: dict[_Wanted, Stream] = {}
     filled: _Filled = []
-    chosen: list[tuple[Stream, ...]] = []
+    chosen: list[list[_Wanted]] = []
     for binding in bindings:
         of_group = []
         for index, each in enumerate(binding.inputs):
             topic = each.config
             needs_place = binding.group.restamp is not None and topic.stamp != "header"
-            wanted = (each.topic, topic.stamp, topic.key, needs_place, topic.is_of_device, topic.delay_ns)
+            wanted = (each.topic, topic.stamp, topic.key, needs_place)
             if wanted not in streams:
                 streams[wanted] = Stream(each.topic, topic.type or "", keys=None if topic.key is None else [])
                 readers = [(channel, column_reader(binding.group, index, channel)) for channel in each.channels]
-                filled.append((streams[wanted], readers, topic.device_clock()))
-            of_group.append(streams[wanted])
-        chosen.append(tuple(of_group))
+                filled.append((streams[wanted], readers))
+            of_group.append(wanted)
+        chosen.append(of_group)
     _pour(recording, filled)
-    return tuple(chosen)
+    mapped: dict[tuple[_Wanted, int], Stream] = {}
+    given: list[tuple[Stream, ...]] = []
+    for binding, of_group in zip(bindings, chosen, strict=True):
+        of_each = []
+        for wanted, topic in zip(of_group, binding.group.topics, strict=True):
+            stream, about = streams[wanted], (wanted, topic.delay_ns)
+            if topic.is_of_device:
+                stream = mapped[about] = mapped.get(about) or stream.by_device(topic.delay_ns)
+            of_each.append(stream)
+        given.append(tuple(of_each))
+    return tuple(given)
 
 
 def read_topics(recording: Recording) -> tuple[tuple[Channel, Stream], ...]:
@@ -98,11 +136,11 @@ def read_topics(recording: Recording) -> tuple[tuple[Channel, Stream], ...]:
     for channel in recording.channels:
         found.setdefault((channel.topic, channel.type, channel.encoding), []).append(channel)
     filled: _Filled = [
-        (Stream(topic, type_name), [(channel, stamp_or_receipt_column(channel)) for channel in channels], None)
+        (Stream(topic, type_name), [(channel, stamp_or_receipt_column(channel)) for channel in channels])
         for (topic, type_name, _), channels in found.items()
     ]
     _pour(recording, filled)
-    return tuple((readers[0][0], stream) for stream, readers, _ in filled)
+    return tuple((readers[0][0], stream) for stream, readers in filled)
 
 
 def messages(streams: Sequence[Stream]) -> Iterator[Message]:
@@ -118,15 +156,19 @@ def messages(streams: Sequence[Stream]) -> Iterator[Message]:
 
 
 def stamped(group: GroupConfig, streams: Sequence[Stream]) -> list[Stream]:
-    """Return the streams with times of receipt in place of stamps where the group goes by them."""
+    """Return the streams with times of receipt, or mapped stamps, where the group goes by them."""
     return [
-        stream.by_receipt() if topic.stamp == "receive" else stream
+        stream.by_receipt()
+        if topic.stamp == "receive"
+        else stream.by_device(topic.delay_ns)
+        if topic.is_of_device and stream.mapping is None
+        else stream
         for topic, stream in zip(group.topics, streams, strict=True)
     ]
 
 
 def _pour(recording: Recording, filled: _Filled) -> None:
-    columns = Columns([readers for _, readers, _ in filled], [clock for _, _, clock in filled])
+    columns = Columns([readers for _, readers in filled])
     begin = 0
     for batch in map(Batch, recording.batches(columns.channels)):
         for index, column in columns.read(batch):

@@ -10,7 +10,9 @@ from syncrelay.config.units import parse_duration
 from syncrelay.config.wording import all_of
 from syncrelay.explain import words
 from syncrelay.explain.changes import Change as TriedChange
+from syncrelay.explain.epochs import BOOT_NS
 from syncrelay.explain.nearest import Received, quantile
+from syncrelay.explain.other_stamps import by_other_stamps, wandering
 from syncrelay.explain.trials import Trials
 from syncrelay.recordings.analysis.changes import Change
 from syncrelay.recordings.analysis.evaluation import Evaluation, evaluate
@@ -126,10 +128,21 @@ def _stamping(group: GroupConfig, streams: Sequence[Stream], trials: Trials) -> 
         yield from _by_arrival(group, reason)
         return
     for index, topic in enumerate(group.topics):
+        apart, reason = abs(trials.apart(index)), ""
         offset = None if topic.offset_ns else trials.clock_offset(index)
-        if offset is not None and abs(trials.apart(index)) > _SECOND:
-            reason = f"its stamps are {words.duration(abs(trials.apart(index)))} off the others'"
-            yield Change(group.name, index, "offset", offset.value, reason)
+        is_off = offset is not None and apart > _SECOND
+        if is_off:
+            reason = f"its stamps are {words.duration(apart)} off the others'"
+        elif not trials.is_enough(()) and (wandered := wandering(trials, index)):
+            reason = f"its clock went {words.duration(wandered)} off the host's time in the recording"
+        if not reason:
+            continue
+        offsets = (offset,) if offset is not None and is_off else ()
+        # What counts from boot has another offset after the next.
+        is_constant = any(map(trials.by_offset, offsets)) and apart <= BOOT_NS
+        mapped = None if is_constant else by_other_stamps(trials, index, keys=["clock"])
+        changes = mapped.changes if mapped else offsets
+        yield from (Change(group.name, index, each.key, each.value, reason) for each in changes)
 
 
 def _by_arrival(group: GroupConfig, reason: str) -> Iterator[Change]:
@@ -150,7 +163,8 @@ def _periods(group: GroupConfig, streams: Sequence[Stream]) -> Iterator[Change]:
         return
     for index, (topic, stream) in enumerate(zip(group.topics, streams, strict=True)):
         bound = _lower_bound(figures_of(stream))
-        if bound and not topic.min_period_ns:
+        # Mapped stamps keep no period.
+        if bound and not topic.min_period_ns and not topic.is_of_device:
             yield Change(group.name, index, "min_period", bound, "")
 
 

@@ -16,7 +16,7 @@ from syncrelay.recordings.bag.columns import Nanoseconds
 
 _LARGEST: Final = 2**31 - 1
 # With other stamps, the drawn distances are not those that suggested values are for.
-_OTHER_STAMPS = ("stamp", "offset")
+_OTHER_STAMPS = ("stamp", "offset", "clock")
 _BINS: Final = 60
 # What lies so many times farther out than most do is counted, not drawn: it would press all others into one bar.
 _FARTHEST: Final = 1.5

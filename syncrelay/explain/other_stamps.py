@@ -1,0 +1,165 @@
+"""Whether other stamps of an input would bring sets: mapped as `clock: device` has it, or the times of receipt."""
+
+from collections.abc import Collection, Iterator
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from syncrelay.clock import MOST_RATE, DeviceClock, Step
+from syncrelay.explain.changes import Change, Changes, changed
+from syncrelay.explain.codes import Code
+from syncrelay.explain.dry_run import UNREADABLE
+from syncrelay.explain.facts import GroupFacts
+from syncrelay.explain.figures import InputFigures
+from syncrelay.explain.findings import written
+from syncrelay.explain.nearest import Nanoseconds, in_order, quantile, shifted, sides
+from syncrelay.explain.trials import REQUIRED, Trials, Tried, Verdict
+from syncrelay.sync import Message
+
+# A clock that is set more often, beside a few times at first, is no clock that can be mapped: it has another rate.
+_FEW_STEPS: Final = 2
+_SET_EVERY: Final = 30_000_000_000
+_FEWEST: Final = 5
+# A part of a delay that is less is not worth a key, and no device is known to keep it.
+_TENTH_OF_A_MS: Final = 100_000
+# Spans near the tolerance are over it when two devices have run a little apart: there may be something better.
+_ROOM: Final = 0.8
+# What wanders by less is not why sets are missing: a share of the tolerance, and what drivers take.
+_MATTERS: Final = 0.5
+_LEAST_DISTANCE: Final = 1_000_000
+# A drift is too great to be followed if it is by so many standard errors, and goes along a line.
+_EVIDENT: Final = 5
+_BENDS: Final = 8
+
+
+def by_other_stamps(
+    trials: Trials, index: int, target: int | None = REQUIRED, *, keys: Collection[str] = ("clock", "stamp")
+) -> Tried | None:
+    """Return what mapping an input's stamps gives, or else its times of receipt; None of what does not bring the sets.
+
+    The mapping begins with the messages that it is tried on, and what that costs is counted. Of the least delay, which
+    it cannot know, it is also tried to take off as much as the mapped stamps lie behind those of the others.
+    """
+    about = (index, target, *keys)
+    if about not in trials.by_stamps:
+        trials.by_stamps[about] = _tried(trials, index, target, keys)
+    return trials.by_stamps[about]
+
+
+def offered_stamps(facts: GroupFacts, code: Code, index: int) -> str:
+    """Say to have an input's stamps mapped, or to go by receipt, and what that gives; nothing if it does not help."""
+    if facts.suggester is None:
+        return ""
+    keys = ("clock", "stamp") if _can_be_followed(facts.inputs[index].figures) else ("stamp",)
+
+    def question(trials: Trials) -> Verdict:
+        tried = by_other_stamps(trials, index, keys=keys)
+        return Verdict(() if tried is None else (tried,))
+
+    found = facts.suggester.ask((code, index, *keys), question, now=facts.figures.now).tried
+    if not found:
+        return ""
+    gives = f"which would give {found[0].given} of {found[0].possible} possible sets"
+    return f", or write {written(facts, found[0].changes)}, {gives}"
+
+
+def wandering(trials: Trials, index: int) -> int:
+    """Return how far an input's clock went off the host's time, in nanoseconds; 0 of less than can matter."""
+    tolerance, messages = trials.config.options.tolerance, trials.inputs[index]
+    mapped = None if tolerance is None else _mapped_stamps(trials, index)
+    if tolerance is None or mapped is None or not messages.are_stamped.any():
+        return 0
+    behind = shifted(mapped[messages.are_stamped] - messages.stamps[messages.are_stamped], 0)
+    wandered = quantile(behind, 0.95) - quantile(behind, 0.05)
+    return wandered if wandered >= max(_LEAST_DISTANCE, _MATTERS * tolerance.ns) else 0
+
+
+def _can_be_followed(figures: InputFigures) -> bool:
+    """Whether no rate is evident that the mapping does not follow. What bends is a clock that was set."""
+    if figures.reading is not None and not figures.reading.is_unit:
+        return False
+    drift = figures.drift
+    is_line = drift is not None and abs(drift.drifted_ns) >= _BENDS * drift.bend_ns
+    return not is_line or drift is None or abs(drift.slope) <= max(MOST_RATE, _EVIDENT * drift.error)
+
+
+def _tried(trials: Trials, index: int, target: int | None, keys: Collection[str]) -> Tried | None:
+    config = trials.config
+    topic, tolerance = config.topics[index], config.options.tolerance
+    needs_equal = tolerance is not None and not tolerance.takes_times_of_arrival
+    if topic.is_of_device or topic.stamp == "receive" or needs_equal:
+        return None
+    narrow = None
+    for stamps, changes in _attempts(trials, index, target, keys):
+        moved = _with_stamps(trials, index, stamps, changes)
+        if moved.is_enough((), target):
+            tried = Tried(changes, moved.given((), target), trials.given((), target), len(moved.spans(target)))
+            if tolerance is None or quantile(moved.spans(target), 0.95) <= _ROOM * tolerance.ns:
+                return tried
+            narrow = narrow or tried
+    return narrow
+
+
+def _attempts(
+    trials: Trials, index: int, target: int | None, keys: Collection[str]
+) -> Iterator[tuple[Nanoseconds, Changes]]:
+    """Yield other stamps for an input's messages, and what to write for them."""
+    is_mapped = "clock" in keys and not trials.config.inputs.node.use_sim_time
+    if is_mapped and (mapped := _mapped_stamps(trials, index)) is not None:
+        device: Changes = (Change("clock", "device", index),)
+        yield mapped, device
+        for late in _lateness(_with_stamps(trials, index, mapped, device), index, target):
+            yield mapped - late, (*device, Change("delay", f"{late / 1_000_000:g}ms", index))
+    if "stamp" in keys:
+        yield trials.inputs[index].received, (Change("stamp", "receive", index),)
+
+
+def _mapped_stamps(trials: Trials, index: int) -> Nanoseconds | None:
+    """Return an input's stamps as they would be mapped; None of a clock that would be taken as set time and again."""
+    steps: list[Step] = []
+    clock, messages = DeviceClock(stepped=steps.append), trials.inputs[index]
+    pairs = list(zip(messages.stamps.tolist(), messages.received.tolist(), strict=True))
+    mapped = [stamp if stamp == UNREADABLE else clock.host_time(stamp, received) for stamp, received in pairs]
+    if not pairs or len(steps) > _FEW_STEPS + (pairs[-1][1] - pairs[0][1]) // _SET_EVERY:
+        return None
+    return np.array(mapped, dtype=np.int64)
+
+
+def _with_stamps(trials: Trials, index: int, stamps: Nanoseconds, changes: Changes) -> Trials:
+    """Return trials of the same messages with other stamps of an input, of the group with changes."""
+    inputs = [each._replace(stamps=stamps) if at == index else each for at, each in enumerate(trials.inputs)]
+
+    def messages() -> Iterator[Message]:
+        mapped = iter(stamps.tolist())
+        for each in trials.messages():
+            yield Message(index, next(mapped), each.payload, each.key) if each.input == index else each
+
+    # As in a window: what the mapping costs until it has settled is not held against it.
+    return replace(
+        trials,
+        config=changed(trials.config, changes),
+        messages=messages,
+        inputs=inputs,
+        is_window=True,
+        by_stamps={},
+        _targets={},
+        _runs={},
+    )
+
+
+def _lateness(moved: Trials, index: int, target: int | None) -> Iterator[int]:
+    """Yield by how much mapped stamps lie behind those before them that are nearest, where that is a constant."""
+    possible = moved.possible(target)
+    if possible is None or len(possible.among) < 2:  # noqa: PLR2004  one alone is beside nothing
+        return
+    other = possible.pivot if possible.pivot != index else next(each for each in possible.among if each != index)
+    own, others = (in_order(moved.inputs[at], moved.config.topics[at].offset_ns).stamps for at in (index, other))
+    late = sides(others, own).after if possible.pivot == other else sides(own, others).before
+    # What the mapping did at first, before it had settled, tells nothing.
+    late = late[len(late) // 2 :]
+    if len(late) < _FEWEST:
+        return
+    usual = quantile(late, 0.5) // _TENTH_OF_A_MS * _TENTH_OF_A_MS
+    if usual and 2 * (quantile(late, 0.9) - quantile(late, 0.1)) <= usual:
+        yield usual
