@@ -76,7 +76,7 @@ def look(draw: Drawn, seconds: float) -> Looked:
         second,
         report,
         report.facts.figures.sets,
-        len(list(sets_of(well, well.config, second))),
+        len(list(sets_of(well, well.config, until=second))),
         not unhealthy([report], seconds),
         tuple(each.code for each in worst_first([*check_groups([report], ())])),
     )

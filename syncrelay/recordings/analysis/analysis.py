@@ -12,6 +12,7 @@ from syncrelay.explain.trials import Trials
 from syncrelay.recordings.analysis.changes import Change, with_changes
 from syncrelay.recordings.analysis.curves import Curves, curves_of
 from syncrelay.recordings.analysis.evaluation import Evaluation, evaluate
+from syncrelay.recordings.analysis.mappings import MappedInput, MappingCurve, mapped_inputs
 from syncrelay.recordings.analysis.pairs import Pair, pair
 from syncrelay.recordings.analysis.streams import Stream, read_streams, stamped
 from syncrelay.recordings.analysis.suggest import Suggestion, suggest, trials_of
@@ -50,6 +51,11 @@ class GroupAnalysis:
         None where no measure tells which messages belong together, or a required input has no stamps.
         """
         return None if self.group.options.matched_by else self.trials.possible()
+
+    @cached_property
+    def mapped(self) -> tuple[tuple[MappedInput, MappingCurve], ...]:
+        """The inputs whose stamps were mapped to the host's time, and how."""
+        return tuple(mapped_inputs(self.group, self.streams))
 
     @cached_property
     def unneeded(self) -> Unneeded:

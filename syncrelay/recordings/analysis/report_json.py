@@ -56,6 +56,16 @@ def _group(each: GroupAnalysis) -> dict[str, Any]:
             }
             for topic, counts, fates in zip(each.group.topics, each.evaluation.counts, each.fates, strict=True)
         ],
+        "mapped": [
+            {
+                "topic": mapped.topic,
+                "offset": mapped.offset,
+                "rate_ppm": mapped.rate_ppm,
+                "restarts": [{"at": step.at, "by": step.by} for step in mapped.restarts],
+                "delay": mapped.delay,
+            }
+            for mapped, _ in each.mapped
+        ],
         "pairs": [
             {
                 "first": pair.first,

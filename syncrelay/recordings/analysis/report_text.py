@@ -95,6 +95,7 @@ def _group(each: GroupAnalysis) -> Iterator[str]:
     yield f"  {_sets(each)}"
     for row in each.fates:
         yield f"  {row.topic}: {', '.join(_fates(row))}"
+    yield from (f"  {mapped}" for mapped, _ in each.mapped)
     shown = worth_seeing(each.pairs)
     for at in shown:
         yield f"  {pair_line(each.pairs[at])}"

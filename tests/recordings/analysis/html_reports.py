@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import random
 import re
 from base64 import b64decode
 from collections.abc import Sequence
@@ -12,10 +13,10 @@ from typing import Any
 from syncrelay.recordings.analysis import Analysis, analyze
 from tests.recordings.bag.making import write_mcap
 from tests.recordings.bag.reading import bound
-from tests.ros.cdr_messages import VECTOR
+from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
-from tests.ros.streams import jittery, merged
+from tests.ros.streams import BEGIN, MS, jittery, merged
 
 TOPICS = ("/camera", "/lidar", "/imu")
 HOSTILE = "</script><script>window.stranger=1</script><img src=x onerror='window.stranger=1'>\"'`<b>`&amp;"
@@ -38,6 +39,23 @@ def analyzed(folder: Path, frames: Sequence[Frame], **keys: Any) -> Analysis:
     text = config({"fused": group})
     with bound(write_mcap(folder / "drive.mcap", frames), text=text) as (recording, bindings):
         return analyze(recording, text, bindings)
+
+
+def of_device(folder: Path, *, seconds: int) -> Analysis:
+    """The analysis of a drive whose lidar has a clock of its own: 200 ppm slow, and set back by 3 s halfway.
+
+    Each of its messages is received up to 4 ms later than the quickest, which takes 6 ms; of those, 5 are taken off.
+    """
+    chance = random.Random(1)
+    frames = [frame for frame in drive(seconds=seconds) if frame.topic == "/camera"]
+    for number in range(10 * seconds):
+        ms = 100 * number
+        by_device = ms * (1 - 200e-6) - (3000 if 2 * number >= 10 * seconds else 0)
+        received = BEGIN + round((ms + 6 + 4 * chance.random()) * MS)
+        frames.append(Frame("/lidar", VECTOR, received, vector(BEGIN + round(by_device * MS))))
+    topics = inputs(dict.fromkeys(("/camera", "/lidar"), VECTOR))
+    topics[1] |= {"clock": "device", "delay": "5ms"}
+    return analyzed(folder, merged(frames), slop="20ms", topics=topics)
 
 
 def renamed(analysis: Analysis) -> Analysis:

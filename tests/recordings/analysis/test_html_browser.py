@@ -11,7 +11,7 @@ from syncrelay.recordings.analysis import Analysis
 from syncrelay.recordings.analysis.html import as_html
 from syncrelay.recordings.analysis.report_json import as_json
 from tests.browser import launched, needs_chromium, opened
-from tests.recordings.analysis.html_reports import HOSTILE, TOPICS, analyzed, drive, renamed
+from tests.recordings.analysis.html_reports import HOSTILE, TOPICS, analyzed, drive, of_device, renamed
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import inputs
 from tests.ros.streams import jittery, merged
@@ -111,6 +111,17 @@ def test_everything_is_drawn_without_a_complaint_or_a_request(scheme, width, bro
         assert opened.page.evaluate(_HAS_COLOUR, [".by-slop", "now"])
         paper = opened.page.evaluate("getComputedStyle(document.body).backgroundColor")
         assert paper == {"light": "rgb(255, 255, 255)", "dark": "rgb(18, 22, 27)"}[scheme]
+
+
+@pytest.mark.parametrize(("scheme", "width"), [("dark", 390), ("light", 1400)])
+def test_how_a_device_was_mapped_is_drawn_with_its_line_and_the_settings_of_its_clock(scheme, width, browser, tmp_path):
+    path = tmp_path / "report.html"
+    path.write_text(as_html("drive.mcap", of_device(tmp_path, seconds=60)))
+    with _opened(browser, path, scheme=scheme, width=width) as opened:
+        assert opened.complaints == []
+        for name in ("curve", "second", "now"):
+            assert opened.page.evaluate(_HAS_COLOUR, [".mapping", name]), name
+        assert opened.page.evaluate("document.documentElement.scrollWidth") <= width
 
 
 def test_of_many_pairs_the_farthest_apart_are_seen_first_and_the_rest_is_drawn_when_it_is_unfolded(browser, tmp_path):

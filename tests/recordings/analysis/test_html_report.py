@@ -16,7 +16,7 @@ from syncrelay.recordings.analysis.html.lanes import Lanes, lanes_of
 from syncrelay.status.fates import CODES, FATES, MATCHED, UNNEEDED
 from syncrelay.sync import DropReason
 from tests.cli.command import run_here
-from tests.recordings.analysis.html_reports import analyzed, drawings_in, drive, unpacked
+from tests.recordings.analysis.html_reports import analyzed, drawings_in, drive, of_device, unpacked
 from tests.recordings.bag.making import rig, rig_file, write_mcap
 from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.configs import inputs
@@ -198,3 +198,24 @@ def test_topics_without_a_file_are_drawn_too(folder):
     assert "100 of 100 possible sets come together" in page
     text = done.stdout.partition("A file that gives these sets:\n\n")[2]
     assert escape(text.rstrip()) in page
+
+
+def test_the_line_that_a_device_was_mapped_by_lies_on_its_quickest_messages_and_begins_anew_where_its_clock_was_set(
+    tmp_path,
+):
+    page = as_html("drive.mcap", of_device(tmp_path, seconds=60))
+    ((mapping,),) = [group["mappings"] for group in drawings_in(page)["groups"]]
+    times, stamps, line = (np.array(unpacked(mapping[key])) for key in ("times", "stamps", "line"))
+    ((step, by),), (begin,) = mapping["steps"], mapping["begins"]
+    assert len(times) == len(stamps) == len(line) == 600
+    assert times[begin - 1] < step <= times[begin]
+    assert round(by / _SECOND) == -3
+    assert np.all(stamps <= line)
+    for of in (slice(100, begin - 20), slice(begin + 20, None)):
+        assert np.quantile(line[of] - stamps[of], 0.05) < 1_000_000
+        # As the clock runs slow, its stamps fall behind, by 200 us a second, and the middle of the line is at 0.
+        slope = np.polyfit(times[of] / _SECOND, line[of] / 1000, 1)[0]
+        assert abs(slope + 200) < 20
+        assert line[of].max() > 0 > line[of].min()
+    assert "/lidar is mapped to the host" in page
+    assert "Stamps mapped" not in as_html("drive.mcap", analyzed(tmp_path, drive(seconds=4)))

@@ -11,6 +11,7 @@ import numpy as np
 from syncrelay.config import GroupConfig
 from syncrelay.recordings.analysis import Analysis, GroupAnalysis
 from syncrelay.recordings.analysis.html.lanes import Lanes, lanes_of
+from syncrelay.recordings.analysis.mappings import MappedInput, MappingCurve
 from syncrelay.recordings.analysis.pairs import Pair
 from syncrelay.recordings.bag.columns import Nanoseconds
 
@@ -20,6 +21,8 @@ _OTHER_STAMPS = ("stamp", "offset", "clock")
 _BINS: Final = 60
 # What lies so many times farther out than most do is counted, not drawn: it would press all others into one bar.
 _FARTHEST: Final = 1.5
+# Of the messages of a device, the farthest are not drawn: one that was held up for seconds.
+_CUT_OFF: Final = 0.005
 # A slop line so many times farther out than the offsets is left out for the same reason.
 _FARTHEST_LINE: Final = 3
 
@@ -58,10 +61,25 @@ def drawings_of(group: GroupAnalysis, analysis: Analysis, *, most: int) -> Drawi
             "timeline": _timeline(lanes),
             "slops": _marks(*slops),
             "sizes": _marks(*sizes),
+            "mappings": [_mapping(mapped, curve, analysis.begin) for mapped, curve in group.mapped],
             "histograms": [{"edges": each.edges, "counts": each.counts} for each in histograms],
             **_curves(group),
         },
     )
+
+
+def _mapping(mapped: MappedInput, curve: MappingCurve, begin: int) -> dict[str, Any]:
+    """Return stamps, the line that they were mapped to, and where the clock was set; what lies far out is cut off."""
+    heights = np.concatenate([curve.line, curve.stamps])
+    low, high = (float(np.quantile(heights, share)) for share in (_CUT_OFF, 1 - _CUT_OFF))
+    return {
+        "times": pack(curve.times - begin),
+        "stamps": pack(curve.stamps),
+        "line": pack(curve.line),
+        "begins": curve.begins,
+        "between": (low, high),
+        "steps": [(step.at - begin, step.by) for step in mapped.restarts],
+    }
 
 
 def _slop(group: GroupConfig) -> int | None:

@@ -72,6 +72,7 @@ def group_words(group: GroupAnalysis, drawings: Drawings) -> dict[str, Any]:
         "fates": fates,
         "rows": [_fate_row(row, fates) for row in group.fates],
         "unneeded": "; ".join(_unneeded(group.fates)),
+        "mapped": [str(mapped) for mapped, _ in group.mapped],
         "pairs": [pairs[at] for at in seen],
         "other_pairs": [pairs[at] for at in unseen],
         "others": other_pairs([group.pairs[at] for at in unseen]) if unseen else "",

@@ -103,6 +103,28 @@ function drawHistogram(place, {edges, counts}, slops) {
   }, [middles, counts]);
 }
 
+// A device's stamps against times of receipt, the line that they were mapped to, and where its clock was set.
+async function drawMapping(place, {times, stamps, line, begins, between, steps}) {
+  const [at, points, mapped] = await Promise.all([times, stamps, line].map(unpack));
+  const [low, high] = between, margin = Math.max((high - low) / 12, 1000);
+  const [size, unit] = unitOf(Math.max(-low, high, margin));
+  const marks = steps.map(([when, by]) => (
+    [when / SECOND, `set ${by > 0 ? "forward" : "back"} ${duration(Math.abs(by))}`, "now", [6, 4]]
+  ));
+  const heights = Array.from(mapped, (height) => height / size);
+  // No line leads from one setting of the clock to the next.
+  begins.forEach((begin) => { heights[begin] = null; });
+  plotIn(place, 240, {
+    padding: [30, 12, 0, 0],
+    scales: {x: {time: false}, y: {range: [(low - margin) / size, (high + margin) / size]}},
+    axes: [axis("seconds since the recording began"), axis(unit, {size: 60})],
+    series: [{}, {
+      paths: () => null, points: {show: true, size: 3, width: 0, fill: () => colour("curve")},
+    }, {stroke: () => colour("second"), width: 2, points: {show: false}}],
+    hooks: {draw: [(plot) => drawMarks(plot, marks)]},
+  }, [Array.from(at, (time) => time / SECOND), Array.from(points, (height) => height / size), heights]);
+}
+
 const FROM_ZERO = {range: (plot, low, high) => [0, Math.max(1, high) * 1.04]};
 
 // A point is a run of the engine; the lines only lead the eye from one to the next.

@@ -219,6 +219,9 @@ async function drawGroup(section, drawn, fates) {
   section.querySelectorAll(".histogram").forEach((place) => {
     drawHistogram(place, drawn.histograms[Number(place.dataset.pair)], drawn.slops);
   });
+  await Promise.all(Array.from(section.querySelectorAll(".mapping"), (place) => (
+    drawMapping(place, drawn.mappings[Number(place.dataset.input)])
+  )));
   const bySlop = section.querySelector(".by-slop"), byQueue = section.querySelector(".by-queue");
   if (bySlop) drawBySlop(bySlop, drawn.by_slop, drawn.slops);
   if (byQueue) drawByQueue(byQueue, drawn.by_queue_size, drawn.sizes);
