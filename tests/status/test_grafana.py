@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any, Final
@@ -11,6 +12,7 @@ import pytest
 from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
+from syncrelay.explain import Sender
 from syncrelay.status.metrics import registry
 from tests.status.support.states import relay, working
 
@@ -29,6 +31,7 @@ _DATASOURCE = {"type": "prometheus", "uid": "${datasource}"}
 _OF_A_SCRAPE = {"job", "instance"}
 _BUILT_IN = {"__rate_interval", "__interval"}
 _FUNCTIONS = {"changes", "count", "histogram_quantile", "max", "rate", "sum", "time", "vector"}
+_SENDERS = (Sender("/usb_cam", 9, 8, sent_in_all=700, delivered_in_all=650),)
 _GROUPING = re.compile(r"\b(?:by|without|on|ignoring) ?\(([^)]*)\)")
 
 
@@ -42,7 +45,10 @@ def _series(expression: str) -> Iterator[tuple[str, set[str]]]:
 
 def _exported():
     """The labels of each series of a scrape, by the name of the series."""
-    text = generate_latest(registry(lambda: relay(working()))).decode()
+    report = working()
+    inputs = tuple(replace(each, graph=replace(each.graph, senders=_SENDERS)) for each in report.facts.inputs)
+    with_senders = replace(report, facts=replace(report.facts, inputs=inputs))
+    text = generate_latest(registry(lambda: relay(with_senders))).decode()
     samples = [sample for family in text_string_to_metric_families(text) for sample in family.samples]
     return {each.name: set(each.labels) | _OF_A_SCRAPE for each in samples}
 

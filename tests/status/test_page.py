@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from syncrelay.explain import Sender
 from syncrelay.status import RelayState
 from tests.browser import Opened, launched, needs_chromium, opened
 from tests.hostile_names import FORGED, hostile_name
@@ -236,3 +237,20 @@ def test_without_sets_the_messages_of_the_slowest_input_are_apart(browser):
         )
         assert len(places) > 10
         assert max(places) - min(places) > 17 * (len(places) - 1)
+
+
+@pytest.mark.parametrize(("scheme", "width"), [("dark", 390), ("light", 1400)])
+def test_of_each_publisher_it_is_shown_what_was_sent_delivered_and_lost(scheme, width, browser):
+    told = states.rig()
+    report, *others = told.groups
+    camera, lidar = report.facts.inputs
+    senders = Sender("/usb_cam", 200, 188, sent_hz=20.0), Sender("/spare_cam", 4, 4)
+    inputs = tuple(replace(of, graph=replace(of.graph, senders=each)) for of, each in ((camera, senders), (lidar, ())))
+    state = replace(told, groups=(replace(report, facts=replace(report.facts, inputs=inputs)), *others))
+    with watching(browser, state, scheme=scheme, width=width) as (opened_page, _):
+        shown = opened_page.page.locator("#group .input dl").all_inner_texts()
+        sent = "200 by /usb_cam at 20 Hz: 188 delivered, 12 lost; 4 by /spare_cam: 4 delivered, 0 lost"
+        assert f"sent in the last 10 s\n{sent}\n" in shown[0]
+        assert "sent in the last 10 s" not in shown[1]
+        assert opened_page.page.evaluate("document.documentElement.scrollWidth") <= width
+        assert opened_page.complaints == []

@@ -159,13 +159,13 @@ function recentOf(group, width) {
 function input(group, each) {
   const problem = group.findings.find((one) => one.topics.includes(each.topic) && one.severity !== "ok");
   const notes = [each.required ? [] : ["optional"], problem ? [problem.code.replaceAll("_", " ")] : []].flat();
-  const lost = each.lost ? `; ${each.lost} lost on the way` : "";
   const rows = {
     rate: `${each.rate_hz ? `${figure(each.rate_hz)} Hz` : "–"}, lag ${duration(each.lag_ms)}, jitter ${duration(each.jitter_ms)}`,
     type: each.type ?? "not known yet",
     offset: each.offset_ms ? duration(each.offset_ms) : null,
+    "sent in the last 10 s": sent(each),
     "dropped in the last 10 s": counts(each.unneeded_lately, each.other_drops_lately),
-    "in total": `${each.received} received, ${each.matched} in sets, ${each.buffered} waiting, dropped: ${counts(each.unneeded, each.other_drops)}${lost}`,
+    "in total": `${each.received} received, ${each.matched} in sets, ${each.buffered} waiting, dropped: ${counts(each.unneeded, each.other_drops)}`,
     from: nodes(each.publishers) || "no publishers",
     to: `${each.output}: ${nodes(each.subscribers) || "no subscribers"}`,
   };
@@ -178,6 +178,15 @@ function input(group, each) {
 function counts(unneeded, others) {
   const reasons = Object.entries(others).sort(([, one], [, other]) => other - one).map(([reason, count]) => `${count} ${reason}`);
   return [...reasons, ...(unneeded ? [`${unneeded} not needed`] : [])].join(", ") || "none";
+}
+
+// What each publisher sent and what came of it; without numbers of messages, what DDS reports as lost.
+function sent({senders, lost}) {
+  if (!senders.length) return lost ? `${lost} lost on the way` : null;
+  return senders.map((each) => {
+    const rate = each.sent_hz ? ` at ${figure(each.sent_hz)} Hz` : "";
+    return `${each.sent} by ${each.node}${rate}: ${each.delivered} delivered, ${each.lost} lost`;
+  }).join("; ");
 }
 
 function nodes(endpoints) {
