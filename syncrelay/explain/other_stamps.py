@@ -1,8 +1,8 @@
 """Whether other stamps of an input would bring sets: mapped as `clock: device` has it, or the times of receipt."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Hashable, Iterator
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from syncrelay.explain.dry_run import UNREADABLE
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.figures import InputFigures
 from syncrelay.explain.findings import written
-from syncrelay.explain.nearest import Nanoseconds, in_order, quantile, shifted, sides
+from syncrelay.explain.nearest import Nanoseconds, in_order, period_of, quantile, shifted, sides
 from syncrelay.explain.trials import REQUIRED, Trials, Tried, Verdict
 from syncrelay.sync import Message
 
@@ -41,10 +41,8 @@ def by_other_stamps(
     The mapping begins with the messages that it is tried on, and what that costs is counted. Of the least delay, which
     it cannot know, it is also tried to take off as much as the mapped stamps lie behind those of the others.
     """
-    about = (index, target, *keys)
-    if about not in trials.by_stamps:
-        trials.by_stamps[about] = _tried(trials, index, target, keys)
-    return trials.by_stamps[about]
+    found: Tried | None = _once(trials, (index, target, *keys), lambda: _tried(trials, index, target, keys))
+    return found
 
 
 def offered_stamps(facts: GroupFacts, code: Code, index: int) -> str:
@@ -67,7 +65,7 @@ def offered_stamps(facts: GroupFacts, code: Code, index: int) -> str:
 def wandering(trials: Trials, index: int) -> int:
     """Return how far an input's clock went off the host's time, in nanoseconds; 0 of less than can matter."""
     tolerance, messages = trials.config.options.tolerance, trials.inputs[index]
-    mapped = None if tolerance is None else _mapped_stamps(trials, index)
+    mapped = None if tolerance is None else _mapped(trials, index)
     if tolerance is None or mapped is None or not messages.are_stamped.any():
         return 0
     behind = shifted(mapped[messages.are_stamped] - messages.stamps[messages.are_stamped], 0)
@@ -91,8 +89,9 @@ def _tried(trials: Trials, index: int, target: int | None, keys: Collection[str]
     if topic.is_of_device or topic.stamp == "receive" or needs_equal:
         return None
     narrow = None
-    for stamps, changes in _attempts(trials, index, target, keys):
-        moved = _with_stamps(trials, index, stamps, changes)
+    for moved, changes in _attempts(trials, index, target, keys):
+        if narrow is not None and changes[0].key == "stamp":
+            break
         if moved.is_enough((), target):
             tried = Tried(changes, moved.given((), target), trials.given((), target), len(moved.spans(target)))
             if tolerance is None or quantile(moved.spans(target), 0.95) <= _ROOM * tolerance.ns:
@@ -103,16 +102,32 @@ def _tried(trials: Trials, index: int, target: int | None, keys: Collection[str]
 
 def _attempts(
     trials: Trials, index: int, target: int | None, keys: Collection[str]
-) -> Iterator[tuple[Nanoseconds, Changes]]:
-    """Yield other stamps for an input's messages, and what to write for them."""
+) -> Iterator[tuple[Trials, Changes]]:
+    """Yield trials with other stamps of an input's messages, and what to write for them."""
     is_mapped = "clock" in keys and not trials.config.inputs.node.use_sim_time
-    if is_mapped and (mapped := _mapped_stamps(trials, index)) is not None:
+    if is_mapped and (mapped := _mapped(trials, index)) is not None:
         device: Changes = (Change("clock", "device", index),)
-        yield mapped, device
-        for late in _lateness(_with_stamps(trials, index, mapped, device), index, target):
-            yield mapped - late, (*device, Change("delay", f"{late / 1_000_000:g}ms", index))
+        at_once = _with_stamps(trials, index, mapped, device)
+        yield at_once, device
+        for late in _lateness(at_once, index, target):
+            changes = (*device, Change("delay", f"{late / 1_000_000:g}ms", index))
+            yield _with_stamps(trials, index, mapped - late * at_once.inputs[index].are_stamped, changes), changes
     if "stamp" in keys:
-        yield trials.inputs[index].received, (Change("stamp", "receive", index),)
+        by_receipt: Changes = (Change("stamp", "receive", index),)
+        yield _with_stamps(trials, index, trials.inputs[index].received, by_receipt), by_receipt
+
+
+def _once(trials: Trials, about: Hashable, find: Callable[[], Any]) -> Any:
+    """Return what is found, or was found before."""
+    if about not in trials.kept:
+        trials.kept[about] = find()
+    return trials.kept[about]
+
+
+def _mapped(trials: Trials, index: int) -> Nanoseconds | None:
+    """Return what _mapped_stamps does, found once."""
+    found: Nanoseconds | None = _once(trials, index, lambda: _mapped_stamps(trials, index))
+    return found
 
 
 def _mapped_stamps(trials: Trials, index: int) -> Nanoseconds | None:
@@ -142,7 +157,7 @@ def _with_stamps(trials: Trials, index: int, stamps: Nanoseconds, changes: Chang
         messages=messages,
         inputs=inputs,
         is_window=True,
-        by_stamps={},
+        kept={},
         _targets={},
         _runs={},
     )
@@ -155,11 +170,14 @@ def _lateness(moved: Trials, index: int, target: int | None) -> Iterator[int]:
         return
     other = possible.pivot if possible.pivot != index else next(each for each in possible.among if each != index)
     own, others = (in_order(moved.inputs[at], moved.config.topics[at].offset_ns).stamps for at in (index, other))
-    late = sides(others, own).after if possible.pivot == other else sides(own, others).before
+    is_pivot = possible.pivot == index
+    late = sides(own, others).before if is_pivot else sides(others, own).after
     # What the mapping did at first, before it had settled, tells nothing.
     late = late[len(late) // 2 :]
     if len(late) < _FEWEST:
         return
     usual = quantile(late, 0.5) // _TENTH_OF_A_MS * _TENTH_OF_A_MS
-    if usual and 2 * (quantile(late, 0.9) - quantile(late, 0.1)) <= usual:
+    # Stamps that are little before the nearest are not late by nearly a period.
+    is_early = 2 * usual > period_of(others if is_pivot else own) and moved.is_enough((), target)
+    if usual and not is_early and 2 * (quantile(late, 0.9) - quantile(late, 0.1)) <= usual:
         yield usual

@@ -10,7 +10,7 @@ from functools import cached_property
 from itertools import chain, combinations
 from math import ceil
 from statistics import median_low
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -95,8 +95,8 @@ class Trials:
     messages: Callable[[], Iterable[Message]]
     inputs: Sequence[Received]
     is_window: bool
-    by_stamps: dict[Hashable, Tried | None] = field(default_factory=dict)
-    """What other stamps of an input were found to give: see other_stamps."""
+    kept: dict[Hashable, Any] = field(default_factory=dict)
+    """What other_stamps found out of these messages."""
     _targets: dict[int | None, PossibleSets | None] = field(default_factory=dict)
     _runs: dict[Changes, dict[int | None, _Run]] = field(default_factory=dict)
 

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 from syncrelay.explain import Code, Finding, FindingLog, Severity
 from syncrelay.explain.changes import Change
+from syncrelay.explain.dry_run import UNREADABLE
 from syncrelay.explain.nearest import as_arrays
+from syncrelay.explain.other_stamps import by_other_stamps
 from syncrelay.explain.suggester import Suggester
 from syncrelay.explain.trials import REQUIRED, Trials, Tried, Verdict
 from syncrelay.explain.try_budget import OutOfTimeError, TryBudget
@@ -152,6 +154,35 @@ def test_an_offset_is_kept_where_it_is_known_and_a_clock_that_was_set_is_offered
         ("clock", "device", "/imu")
     }
     assert_cured(cured, offered=1)
+
+
+def test_stamps_that_were_never_set_or_cannot_be_read_stay_so_where_the_others_are_tried_as_mapped():
+    config = group_of([CAMERA, LIDAR], {"slop": "5ms"})
+    camera = [Message(0, NOW + n * 100 * MS, NOW + n * 100 * MS + 5 * MS) for n in range(100)]
+    lidar = [Message(1, 300 * S + n * 100 * MS, NOW + n * 100 * MS + 42 * MS) for n in range(100)]
+    for place, unset in ((40, 0), (60, 0), (80, UNREADABLE)):
+        lidar[place] = replace(lidar[place], stamp=unset)
+    messages = sorted([*camera, *lidar], key=lambda each: each.payload)
+    trials = Trials(config, lambda: messages, as_arrays(messages, 2), is_window=True)
+    found = by_other_stamps(trials, 1)
+    assert found is not None
+    assert found.changes == (Change("clock", "device", 1), Change("delay", "42ms", 1))
+    # Of the first and the last, it is not known whether a partner is still to come.
+    assert found.given == found.possible == 97
+
+
+def test_times_of_receipt_are_not_offered_where_mapped_stamps_do():
+    """The mapped stamps lie 4.2 ms before the camera's, near the slop, and most times of receipt nearer."""
+    config = group_of([CAMERA, LIDAR], {"slop": "5ms"})
+    camera = [Message(0, NOW + n * 100 * MS, NOW + n * 100 * MS + 5 * MS) for n in range(100)]
+    received = [NOW + n * 100 * MS - (42 if n % 25 == 0 else 27) * MS // 10 for n in range(100)]
+    lidar = [Message(1, 300 * S + n * 100 * MS, at) for n, at in enumerate(received)]
+    messages = sorted([*camera, *lidar], key=lambda each: each.payload)
+    trials = Trials(config, lambda: messages, as_arrays(messages, 2), is_window=True)
+    by_receipt, found = by_other_stamps(trials, 1, keys=["stamp"]), by_other_stamps(trials, 1)
+    assert by_receipt is not None
+    assert found is not None
+    assert found.changes == (Change("clock", "device", 1),)
 
 
 @pytest.mark.parametrize("stamp", [lambda stamp: BEGAN + (stamp - BEGAN) // 2, lambda stamp: stamp // S * S])
