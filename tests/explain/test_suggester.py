@@ -185,6 +185,22 @@ def test_times_of_receipt_are_not_offered_where_mapped_stamps_do():
     assert found.changes == (Change("clock", "device", 1),)
 
 
+def test_a_slop_is_not_narrowed_to_how_near_mapped_stamps_came():
+    messages = [
+        Message(index, NOW + n * 100 * MS + index * MS, NOW + n * 100 * MS + 5 * MS)
+        for n in range(100)
+        for index in (0, 1)
+    ]
+
+    def plan(lidar: Source) -> list[str]:
+        config = group_of([CAMERA, lidar], {"slop": "20ms"})
+        trials = Trials(config, lambda: messages, as_arrays(messages, 2), is_window=False)
+        return [each.key for each in trials.plan]
+
+    assert plan(LIDAR) == ["slop"]
+    assert plan(replace(LIDAR, topic_options={"clock": "device"})) == []
+
+
 @pytest.mark.parametrize("stamp", [lambda stamp: BEGAN + (stamp - BEGAN) // 2, lambda stamp: stamp // S * S])
 def test_a_clock_that_cannot_be_followed_is_not_offered_to_be_mapped(stamp):
     told, _ = rig(CAMERA, LIDAR, Source("/imu", hz=10, stamp=stamp), slop="20ms")

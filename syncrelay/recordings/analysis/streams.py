@@ -58,9 +58,16 @@ class Stream:
     places: "array[int]" = field(default_factory=lambda: array("q"))
     keys: list[Hashable] | None = None
     mapping: Mapping | None = None
+    mapped: dict[int, "Stream"] = field(default_factory=dict)
+    """What by_device gave, by the delay: to map takes as long as to match."""
 
     def by_device(self, delay_ns: int) -> "Stream":
         """Give the same messages with their stamps mapped to the host's time, as `clock: device` has it."""
+        if delay_ns not in self.mapped:
+            self.mapped[delay_ns] = self._by_device(delay_ns)
+        return self.mapped[delay_ns]
+
+    def _by_device(self, delay_ns: int) -> "Stream":
         steps: list[Step] = []
         clock = DeviceClock(delay_ns=delay_ns, stepped=steps.append)
         mapped = array(
@@ -70,7 +77,8 @@ class Stream:
                 for stamp, received in zip(self.stamps, self.received, strict=True)
             ),
         )
-        return replace(self, stamps=mapped, mapping=Mapping(self.stamps, tuple(steps), clock.rate, delay_ns))
+        mapping = Mapping(self.stamps, tuple(steps), clock.rate, delay_ns)
+        return replace(self, stamps=mapped, mapping=mapping, mapped={})
 
     def by_receipt(self) -> "Stream":
         """Give the same messages with the times of receipt for stamps."""
@@ -100,7 +108,7 @@ def read_streams(recording: Recording, bindings: Sequence[GroupBinding]) -> tupl
     """
     streams: dict[_Wanted, Stream] = {}
     filled: _Filled = []
-    chosen: list[list[_Wanted]] = []
+    chosen: list[list[Stream]] = []
     for binding in bindings:
         of_group = []
         for index, each in enumerate(binding.inputs):
@@ -111,20 +119,16 @@ def read_streams(recording: Recording, bindings: Sequence[GroupBinding]) -> tupl
                 streams[wanted] = Stream(each.topic, topic.type or "", keys=None if topic.key is None else [])
                 readers = [(channel, column_reader(binding.group, index, channel)) for channel in each.channels]
                 filled.append((streams[wanted], readers))
-            of_group.append(wanted)
+            of_group.append(streams[wanted])
         chosen.append(of_group)
     _pour(recording, filled)
-    mapped: dict[tuple[_Wanted, int], Stream] = {}
-    given: list[tuple[Stream, ...]] = []
-    for binding, of_group in zip(bindings, chosen, strict=True):
-        of_each = []
-        for wanted, topic in zip(of_group, binding.group.topics, strict=True):
-            stream, about = streams[wanted], (wanted, topic.delay_ns)
-            if topic.is_of_device:
-                stream = mapped[about] = mapped.get(about) or stream.by_device(topic.delay_ns)
-            of_each.append(stream)
-        given.append(tuple(of_each))
-    return tuple(given)
+    return tuple(
+        tuple(
+            stream.by_device(topic.delay_ns) if topic.is_of_device else stream
+            for stream, topic in zip(of_group, binding.group.topics, strict=True)
+        )
+        for binding, of_group in zip(bindings, chosen, strict=True)
+    )
 
 
 def read_topics(recording: Recording) -> tuple[tuple[Channel, Stream], ...]:

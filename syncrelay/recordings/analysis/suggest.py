@@ -142,7 +142,9 @@ def _stamping(group: GroupConfig, streams: Sequence[Stream], trials: Trials) -> 
         is_constant = any(map(trials.by_offset, offsets)) and apart <= BOOT_NS
         mapped = None if is_constant else by_other_stamps(trials, index, keys=["clock"])
         changes = mapped.changes if mapped else offsets
-        yield from (Change(group.name, index, each.key, each.value, reason) for each in changes)
+        for each in changes:
+            why = "mapped stamps are later than the others' by that" if each.key == "delay" else reason
+            yield Change(group.name, index, each.key, each.value, why)
 
 
 def _by_arrival(group: GroupConfig, reason: str) -> Iterator[Change]:
