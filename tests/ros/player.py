@@ -6,8 +6,6 @@ It takes commands on stdin, one a line, and answers each with a line on stdout w
     play SPEED FILE     the frames of FILE were published, paced by their times; where SPEED is `clock`, at these
                         times by the machine's clock
     stop                what it plays was ended
-    acknowledge         all that was published is acknowledged by all subscriptions, which may take 3 s: only
-                        Fast DDS's periodic heartbeat asks for it
 
 It ends when stdin does, also in the midst of what it plays.
 """
@@ -20,7 +18,6 @@ import time
 from pathlib import Path
 
 import rclpy
-from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
@@ -33,7 +30,7 @@ from tests.ros.message_types import import_type
 
 _POLL_S = 0.01
 _LONGEST_SLEEP_S = 0.1
-_ACKNOWLEDGE = Duration(seconds=60)
+_DEPTH = 20_000
 
 
 def main() -> None:
@@ -43,7 +40,7 @@ def main() -> None:
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node(arguments.node)
     profile = QoSProfile(
-        depth=arguments.depth,
+        depth=_DEPTH,
         reliability=ReliabilityPolicy[arguments.reliability.upper()],
         durability=DurabilityPolicy[arguments.durability.upper()],
     )
@@ -58,8 +55,6 @@ def main() -> None:
             _match(publishers, int(words[0]))
         elif command == "play":
             _play(publishers, words[0], Path(words[1].rstrip("\n")))
-        elif command == "acknowledge":
-            _acknowledge(publishers)
         print(command, flush=True)  # noqa: T201  the answer
     leave(node, get_default_context())
 
@@ -70,7 +65,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--node", default="player")
     parser.add_argument("--reliability", default="reliable")
     parser.add_argument("--durability", default="volatile")
-    parser.add_argument("--depth", type=int, default=20_000)
     return parser
 
 
@@ -98,12 +92,6 @@ def _play(publishers: dict[str, Publisher], pace: str, path: Path) -> None:
             if _is_interrupted():
                 return
         publishers[frame.topic].publish(frame.payload)
-
-
-def _acknowledge(publishers: dict[str, Publisher]) -> None:
-    for topic, publisher in publishers.items():
-        if not publisher.wait_for_all_acked(_ACKNOWLEDGE):
-            raise TimeoutError(f"{topic}: not all messages were acknowledged")
 
 
 if __name__ == "__main__":

@@ -46,26 +46,6 @@ def play_until_out(player: Player, collector: Collector, sets: Iterator[list[Fra
     wait_until(out, f"a set on {', '.join(outputs)}")
 
 
-def one_set(
-    player: Player, collector: Collector, sets: Iterator[list[Frame]], outputs: Sequence[str]
-) -> tuple[list[Frame], list[bytes]]:
-    """Play sets until they come out of every output, and one more: its messages, and what came out last.
-
-    The first messages of two outputs need not be of one set: each output is heard from a moment of its own.
-    """
-    play_until_out(player, collector, sets, outputs)
-    last = next(sets)
-    player.play(last)
-    # Of several messages of a topic the latest is the set's.
-    awaited = [padded(frame.payload) for frame in {frame.topic: frame for frame in last}.values()]
-
-    def is_out() -> bool:
-        return all(payload in collector.payloads(output) for payload, output in zip(awaited, outputs, strict=True))
-
-    collector.process.wait_until(is_out, "all messages of the last set")
-    return last, [collector.payloads(output)[-1] for output in outputs]
-
-
 def conclude(player: Player, collector: Collector, recording: Sequence[Frame], outputs: Iterable[str]) -> None:
     """Send a set of equal stamps, newer than the recording, and wait until it has come out of every output.
 

@@ -80,10 +80,6 @@ class Player:
         self.start(recording, speed=speed)
         self.finish()
 
-    def acknowledge(self) -> None:
-        """Wait until all subscriptions have all that was published."""
-        self.process.ask("acknowledge")
-
 
 class Collector:
     """Subscribes, keeps what it gets, and says what the graph shows."""

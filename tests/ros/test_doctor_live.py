@@ -29,11 +29,11 @@ SPAN_S = 240
 REPORTS = ("--json", "--live", "--config")
 
 
-def now(topic, *, behind_s=0.0, stamped=True, once=False):
+def now(topic, *, behind_s=0.0):
     """Vectors stamped as they are sent, or so much earlier."""
     begin = time.time_ns()
-    sent = [begin + n * S // RATE_HZ for n in range(1 if once else SPAN_S * RATE_HZ)]
-    return [Frame(topic, VECTOR, at, vector(at - round(behind_s * S) if stamped else 0)) for at in sent]
+    sent = [begin + n * S // RATE_HZ for n in range(SPAN_S * RATE_HZ)]
+    return [Frame(topic, VECTOR, at, vector(at - round(behind_s * S))) for at in sent]
 
 
 def group(*topics, policy="exact_time", **keys):

@@ -64,7 +64,6 @@ EXPORTED = {
     if isinstance(each, type) and hasattr(each, "by_stamp") and each is not sync.Policy
 }
 """The engines of all policies that the library has."""
-BY_STAMP = [name for name, model in POLICIES.items() if model.by_stamp]
 ONCE = [name for name, model in POLICIES.items() if not model.repeats]
 
 
