@@ -3,9 +3,11 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+from tests.cli.command import GOOD
 from tests.doctor.environments import OURS, ROOT, site_with
 
 _RCLPY = [
@@ -18,35 +20,11 @@ _RCLPY = [
     "rosidl_pycommon",
 ]
 
-_FILE = """\
-version: 1
-groups:
-  front:
-    policy: exact_time
-    topics:
-      - {topic: /a, type: sensor_msgs/msg/Imu}
-      - {topic: /b, type: sensor_msgs/msg/Imu}
-"""
 
-
-@pytest.fixture
-def relay_with(tmp_path):
-    """Run the relay where only the packages named are to be found, and give the finished process."""
-
-    def run(packages, **environ):
-        site = site_with(tmp_path, packages)
-        (tmp_path / "fusion.yaml").write_text(_FILE)
-        # -S: without the environment's own site-packages, and without the wheels' start-up hook.
-        return subprocess.run(
-            [sys.executable, "-S", "-m", "syncrelay", "--config", tmp_path / "fusion.yaml"],
-            env={"PYTHONPATH": f"{ROOT}:{site}", "PATH": os.environ["PATH"], **environ},
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
-        )
-
-    return run
+def _relay(folder: Path, *options: str, **environ: str) -> subprocess.CompletedProcess[str]:
+    (folder / "fusion.yaml").write_text(GOOD)
+    argv = [sys.executable, *options, "-m", "syncrelay", "--config", str(folder / "fusion.yaml")]
+    return subprocess.run(argv, env=environ, capture_output=True, text=True, timeout=120, check=False)
 
 
 @pytest.mark.parametrize(
@@ -63,8 +41,10 @@ def relay_with(tmp_path):
     ],
     ids=["no rclpy", "a ROS for another Python", "no middleware"],
 )
-def test_what_is_missing_is_named_with_the_ways_to_it(relay_with, packages, environ, said):
-    run = relay_with(packages, **environ)
+def test_what_is_missing_is_named_with_the_ways_to_it(packages, environ, said, tmp_path):
+    path = f"{ROOT}:{site_with(tmp_path, packages)}"
+    # -S: without the environment's own site-packages, and without the wheels' start-up hook.
+    run = _relay(tmp_path, "-S", PYTHONPATH=path, PATH=os.environ["PATH"], **environ)
     assert run.returncode == 69
     assert [words for words in said if words not in run.stderr] == []
     assert "Traceback" not in run.stderr
@@ -72,15 +52,7 @@ def test_what_is_missing_is_named_with_the_ways_to_it(relay_with, packages, envi
 
 @pytest.mark.ros
 def test_a_middleware_that_is_not_installed_is_named_beside_those_that_are(tmp_path):
-    (tmp_path / "fusion.yaml").write_text(_FILE)
-    run = subprocess.run(
-        [sys.executable, "-m", "syncrelay", "--config", tmp_path / "fusion.yaml"],
-        env={**os.environ, "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    run = _relay(tmp_path, **{**os.environ, "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"})
     assert run.returncode == 69
     assert "RMW_IMPLEMENTATION asks for rmw_cyclonedds_cpp" in run.stderr
     assert "rmw_fastrtps_cpp" in run.stderr
