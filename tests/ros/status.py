@@ -4,7 +4,6 @@ import json
 import re
 from collections.abc import Collection
 from typing import Any
-from urllib.error import HTTPError
 from urllib.request import urlopen
 
 from tests.ros.processes import DEADLINE_S, Process, wait_until
@@ -25,14 +24,6 @@ def get(relay: Process, path: str) -> str:
     """The body of a page that must be there."""
     with urlopen(f"{address(relay)}{path}", timeout=DEADLINE_S) as answer:  # noqa: S310  the relay's own
         return str(answer.read().decode())
-
-
-def page(relay: Process, path: str) -> tuple[int, str]:
-    """The code and the body of a page, also of one that says that something is not so."""
-    try:
-        return 200, get(relay, path)
-    except HTTPError as error:
-        return error.code, error.read().decode()
 
 
 def status(relay: Process) -> dict[str, Any]:

@@ -10,8 +10,7 @@ from tests.ros.cdr_messages import VECTOR, serialize
 from tests.ros.processes import wait_until
 from tests.ros.sensors import front, play, stream
 from tests.ros.stage import Stage
-from tests.ros.status import findings, get, page, status
-from tests.ros.streams import merged
+from tests.ros.status import get, status
 
 pytestmark = pytest.mark.ros
 
@@ -49,28 +48,3 @@ def test_messages_that_dds_lost_while_the_relay_stood_still_are_counted_and_the_
     counted = re.search(r'syncrelay_messages_lost_total\{group="front",topic="/camera"\} (\S+)', get(relay, "/metrics"))
     assert counted
     assert float(counted[1]) > 0
-
-
-def test_probes_tell_a_relay_that_waits_from_one_that_is_ready(stage: Stage):
-    relay = stage.relay(front())
-    wait_until(lambda: page(relay, "/livez") == (200, "receiving\n"), "a relay that receives")
-    wait_until(lambda: bool(findings(relay)), "a first look")
-    assert status(relay)["relay"]["ready"] is False
-    play(stage, merged(stream("/camera", hz=10), stream("/lidar", hz=10)))
-    wait_until(lambda: status(relay)["relay"]["ready"], "the relay to be ready")
-    wait_until(lambda: page(relay, "/readyz") == (200, "ready\n"), "a probe that says so")
-    assert 'syncrelay_messages_received_total{group="front",topic="/camera"}' in get(relay, "/metrics")
-
-
-def test_nobody_is_missed_before_those_who_run_had_time_to_be_found(stage: Stage):
-    """One that missed the first announcements is found at the next: up to 3 s after the start, and a little."""
-    relay = stage.relay(front())
-    seen: dict[str, Any] = {}
-
-    def nobody_is_found() -> bool:
-        seen.update(status(relay))
-        codes = {each["code"] for group in seen["groups"] for each in group["findings"]}
-        return not codes.isdisjoint({"alone", "no_publisher"})
-
-    wait_until(nobody_is_found, "a finding that nobody is there")
-    assert seen["relay"]["uptime_s"] > 3.5

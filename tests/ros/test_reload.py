@@ -18,7 +18,7 @@ from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.processes import Process, wait_until
 from tests.ros.reloaded import ReloadedFile
 from tests.ros.stage import Stage
-from tests.ros.status import ANY_PORT, status
+from tests.ros.status import ANY_PORT, address, status
 
 pytestmark = pytest.mark.ros
 
@@ -82,7 +82,7 @@ def _command(stage: Stage, relay: Process, says: str) -> subprocess.CompletedPro
 def test_a_command_has_it_read_and_tells_what_came_of_it(stage: Stage):
     # The command knows a relay by the words that it was started with.
     relay = stage.relay(config({"front": _FRONT}, metrics=ANY_PORT), before=FROM_SCRATCH)
-    relay.wait_for_log("status and metrics: ")
+    relay.wait_for_log(f"watch with `syncrelay top --url {address(relay)}`")
     done = _command(stage, relay, "has read")
     assert (done.returncode, done.stdout.startswith("/syncrelay has read ")) == (0, True)
     (stage.folder / "config-0.yaml").write_text("groups: 5")
