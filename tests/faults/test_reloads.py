@@ -14,7 +14,7 @@ from tests.ros.cdr_messages import NS_PER_SECOND, VECTOR
 from tests.ros.configs import LOSSLESS, ROOMY, inputs
 from tests.ros.processes import wait_until
 from tests.ros.reloaded import ReloadedFile
-from tests.ros.stage import Stage, both_backends
+from tests.ros.stage import BACKEND, BACKENDS, Stage
 from tests.ros.status import ANY_PORT, status
 
 pytestmark = [pytest.mark.ros, pytest.mark.faults]
@@ -32,7 +32,7 @@ _FRONT = {
 
 
 @pytest.mark.timeout(chosen(short=600, long=3600))
-@both_backends
+@pytest.mark.parametrize("backend", chosen(short=[BACKEND], long=BACKENDS))
 def test_a_group_that_stays_loses_and_doubles_nothing_whatever_files_come(stage: Stage, figures):
     file, witness, began = _begun(stage)
     relay = file.relay
