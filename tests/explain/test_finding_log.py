@@ -85,20 +85,9 @@ def warned(silence, seconds, *findings):
 REPEATS = Finding(Code.DUPLICATES, Severity.WARN, "stamps repeat", "look there", 0)
 
 
-def test_a_warning_is_said_once_it_has_lasted():
-    assert warned(FindingLog(), range(100), REPEATS) == [(5, "stamps repeat; look there")]
-
-
 def test_a_warning_of_each_input_is_said():
     other = Finding(Code.DUPLICATES, Severity.WARN, "others repeat", None, 1)
     assert warned(FindingLog(), range(100), REPEATS, other) == [(5, "stamps repeat; look there"), (5, "others repeat")]
-
-
-def test_a_warning_that_comes_back_within_a_minute_is_not_said_again():
-    silence = FindingLog()
-    assert len(warned(silence, range(10), REPEATS)) == 1
-    assert warned(silence, range(10, 60)) == [(19, "resolved 10 s ago: stamps repeat")]
-    assert warned(silence, range(60, 100), REPEATS) == []
 
 
 def test_the_end_of_a_warning_is_said_once_in_its_last_words():
@@ -114,16 +103,6 @@ def test_what_another_finding_explains_is_not_over():
     hidden = [a_group(figures={"now": NOW + second * S, "last_set": NOW + second * S}) for second in range(10, 40)]
     assert [line for facts in hidden for line in silence.remarks(facts, (), {Code.DUPLICATES})] == []
     assert warned(silence, range(40, 60)) == [(49, "resolved 10 s ago: stamps repeat")]
-
-
-def test_what_did_not_last_has_no_end_to_say():
-    silence = FindingLog()
-    warned(silence, range(3), REPEATS)
-    assert warned(silence, range(3, 40)) == []
-
-
-def test_what_is_no_warning_is_never_said():
-    assert warned(FindingLog(), range(100), Finding(Code.TIME_JUMP, Severity.OK, "fell")) == []
 
 
 @pytest.mark.parametrize(("suggestion", "line"), [(None, "so it is"), ("do this", "so it is; do this")])
