@@ -7,7 +7,6 @@ from rosbags.highlevel import AnyReader
 
 from syncrelay.cdr import read_stamp
 from syncrelay.rig.schedule import SENSORS
-from syncrelay.sync import Ticks
 from tests.cli.command import run_here
 from tests.ros.configs import config
 
@@ -42,21 +41,11 @@ def lines(folder):
     return [json.loads(line) for line in done.stdout.splitlines()]
 
 
-def test_there_is_a_set_at_every_tick_of_none_newer_than_it(lines):
-    grid = Ticks(2997, 100)
-    ticks = [line["time"] - _WAIT for line in lines]
-    first = grid.first_from(ticks[0])
-    assert ticks == [grid.at(first + number) for number in range(len(ticks))]
-    # From when all sensors have begun to the end.
-    assert len(ticks) == pytest.approx(4 * 29.97, rel=0.1)
-    for tick, line in zip(ticks, lines, strict=True):
-        assert all(0 <= tick - stamp <= 200_000_000 for stamp in line["stamps"].values())
-
-
 def test_what_is_written_has_the_stamps_of_the_ticks(folder, lines):
     with AnyReader([folder / "out.mcap"]) as reader:
         written = [read_stamp(raw) for connection, _, raw in reader.messages() if "lidar" in connection.topic]
     assert written == [line["time"] - _WAIT for line in lines]
+    assert len(written) > 100
 
 
 def test_the_drawing_of_a_file_tells_the_clock(folder):
