@@ -38,6 +38,7 @@ _SHOW_A_UNIT: Final = 2
 _BETTER: Final = 0.2
 _LEAST_SCATTER: Final = 20_000_000
 _WATCHED: Final = _SECOND
+_NEVER_HELD: Final = 30 * _SECOND
 # The delays between these quantiles: a pause or a message that was held up says nothing of a clock.
 _MIDDLE: Final = (0.1, 0.9)
 _RESOLUTIONS: Final = (_SECOND, _SECOND // 10, _SECOND // 100)
@@ -116,7 +117,9 @@ def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
         return None
     found = _of_rate(last, scatter)
     if last[-1][1] - last[0][1] < _WATCHED:
-        return found if found is not None and found.is_unit else None
+        # Of messages that were held up and come at once, stamps run fast too, but not over as long.
+        is_sure = found is not None and found.is_unit and abs(last[-1][0] - last[0][0]) > _NEVER_HELD
+        return found if is_sure else None
     return _of_parts(last, scatter) or found
 
 
