@@ -1,15 +1,22 @@
 """What a user can see of a script, in words that are the same in every ROS."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any, Final
 
 from syncrelay.config.profile import Profile
+from syncrelay.explain import Code
 from syncrelay.relay.ports import EndpointInfo
 
 MS: Final = 1_000_000
+KNOWN: Final = Path(__file__).with_name("seen.txt")
+"""What each script shows; `python -m tests.conformance` prints it."""
+# What is said of findings is held by tests/explain/findings.txt.
+_CODES: Final = frozenset(code.value for code in Code)
+_OF_GROUP: Final = ("front: ", "rear: ")
 # In the sources of ROS.
 _PLACE: Final = re.compile(r", at [^ ,]+:\d+")
 # With its unit, which goes by the size of a duration.
@@ -26,6 +33,34 @@ class Seen:
     """What was asked for, in the order of the script."""
     log: list[str] = field(default_factory=list)
     """The warnings and errors of the relay."""
+
+
+def told(title: str, seen: Seen, blind: Sequence[str]) -> str:
+    """Write down what was seen but for what depends on chance: a line for each output, note and line of the log."""
+    outputs = [f"{name}: {_messages(texts)}" for name, texts in seen.outputs.items()]
+    notes = [_note(note) for note in seen.notes]
+    log = [f"log: {text.splitlines()[0]}" for text in seen.log if not text.startswith(_OF_GROUP)]
+    fields = {"outputs": outputs, "notes": notes, "log": log}
+    return "\n".join([title, *(line for field, lines in fields.items() if field not in blind for line in lines)])
+
+
+def _messages(texts: Sequence[str]) -> str:
+    """Write the time of each message, and whose they are where that changes."""
+    words, before = list[str](), ""
+    for text in texts:
+        when, _, frame = text.partition(" ")
+        words += [when.removesuffix(".000")] if frame == before else [frame, when.removesuffix(".000")]
+        before = frame
+    return " ".join(words)
+
+
+def _note(note: Sequence[Any]) -> str:
+    first, *rest = note
+    return str(first) if first in _CODES else " ".join([str(first), *(_short(each) for each in rest)])
+
+
+def _short(said: Any) -> str:
+    return str(said).partition("\n")[0].replace("geometry_msgs/msg/", "").replace("'", "")
 
 
 def message(content: bytes, begin: int) -> str:
