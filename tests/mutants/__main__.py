@@ -4,8 +4,9 @@
 
 Of each room so many mutants are drawn, or all are taken. For each the tests that run its lines are run, the quickest
 first, in a copy of the tree, until one fails; then the files that hold them, as what a fixture makes once is looked at
-by others, or for a room of the relay worlds drawn by seeds. Where only an import runs its lines, all tests of the room
-are run. A mutant that hangs and one that cannot be imported is noticed too. What lives is printed.
+by others, or for a room of the relay worlds drawn by seeds, if worlds run its module. Where only an import runs its
+lines, all tests of the room are run. A mutant that hangs and one that cannot be imported is noticed too. What lives is
+printed.
 """
 
 import argparse
@@ -13,12 +14,12 @@ import os
 import random
 import resource
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Final, NamedTuple
@@ -26,30 +27,33 @@ from xml.etree import ElementTree as ET
 
 from coverage import CoverageData
 
+from tests.mutants.forks import Ended, Forks
 from tests.mutants.mutations import Mutant, mutants_of, mutated
 from tests.simulated.finding import search
 
 ROOT: Final = Path(__file__).parents[2]
-_RELAYED: Final = ("tests/scenarios", "tests/config", "tests/status")
+# The whole relay on a simulated ROS: what a script shows is known, and a world must keep its promises.
+_PLAYED: Final = ("tests/conformance", "tests/simulated")
+_WORLDS: Final = "tests/simulated/test_worlds.py"
 ROOMS: Final = {
     "sync": ["tests/sync"],
-    "explain": ["tests/explain", "tests/scenarios", "tests/status", "tests/cli/test_tap.py"],
-    "dataflow": ["tests/dataflow", "tests/sync", *_RELAYED],
-    "relay": ["tests/dataflow", *_RELAYED],
+    "explain": ["tests/explain", "tests/status", "tests/cli/test_tap.py"],
+    "dataflow": ["tests/dataflow", "tests/sync", "tests/status", *_PLAYED],
+    "relay": ["tests/dataflow", "tests/status", *_PLAYED],
     "recordings/bag": ["tests/recordings/bag", "tests/recordings/analysis", "tests/recordings/datasets"],
 }
-_PLAYED: Final = frozenset({"dataflow", "relay"})
 # Each for so many seconds of CPU.
 _PLAYED_S: Final = 30.0
 _LEFT_OUT: Final = "not (ros or browser or peer or process or real_data)"
-_PYTEST: Final = (sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "--no-header", "--tb=no")
 # How pytest ends where a test fails; and where a test is not found, or a conftest.py cannot be imported.
 _FAILED: Final = 1
 _REFUSED: Final = 4
 _NOT_IMPORTED: Final = "during collection"
-# Tests of a mutant may take so many times as long as usual, and so much more to begin.
+# Tests of a mutant may take so many times as long as usual, and so much more to begin; where they wait, longer.
 _PATIENCE: Final = 5
-_START_S: Final = 60.0
+_START_S: Final = 20.0
+_WAITING: Final = 4
+_ALL_S: Final = 900.0
 # A mutant that takes memory without end fails before the machine does.
 _MEMORY: Final = 8 << 30
 # So many tests are tried first: most mutants end there.
@@ -70,6 +74,10 @@ class Runs(NamedTuple):
             return self._quickest(found)
         near = {test for tests in lines.values() for test in tests}
         return self._quickest(near) + self._quickest(self.seconds.keys() - near)
+
+    def are_played(self, path: str) -> bool:
+        """Whether worlds run a file."""
+        return any(test.startswith(_WORLDS) for tests in self.tests.get(path, {}).values() for test in tests)
 
     def _quickest(self, tests: set[str]) -> list[str]:
         return sorted(tests, key=lambda test: (self.seconds.get(test, 0.0), test))
@@ -102,21 +110,23 @@ def drawn(room: str, count: int | None, seed: int) -> list[tuple[str, Mutant]]:
 
 def tried(room: str, mutants: Sequence[tuple[str, Mutant]], jobs: int) -> Iterator[bool]:
     """Yield of each mutant of a room whether the tests notice it, and print those that live."""
-    with tempfile.TemporaryDirectory(prefix="syncrelay-mutants-") as folder:
+    with tempfile.TemporaryDirectory(prefix="syncrelay-mutants-") as folder, ExitStack() as opened:
         first = Path(folder, "0")
         shutil.copytree(ROOT, first, ignore=shutil.ignore_patterns(".*", "build", "dist", "__pycache__"))
         runs = _runs(room, first)
-        trees: SimpleQueue[Path] = SimpleQueue()
-        trees.put(first)
-        for number in range(1, jobs):
-            trees.put(shutil.copytree(first, Path(folder, str(number))))
+        trees: SimpleQueue[tuple[Path, Forks]] = SimpleQueue()
+        for number in range(jobs):
+            tree = shutil.copytree(first, Path(folder, str(number))) if number else first
+            # A mutant could be as old and as long as its module, so it leaves nothing compiled.
+            forks = Forks(tree, room, ROOMS[room], {"PYTHONDONTWRITEBYTECODE": "1"})
+            trees.put((tree, opened.enter_context(closing(forks))))
 
         def is_noticed(tried: tuple[str, Mutant]) -> bool:
-            tree = trees.get()
+            tree, forks = trees.get()
             try:
-                return _is_noticed(tree, *tried, runs, is_played=room in _PLAYED)
+                return _is_noticed(tree, forks, *tried, runs)
             finally:
-                trees.put(tree)
+                trees.put((tree, forks))
 
         with ThreadPoolExecutor(jobs) as pool:
             for (path, mutant), noticed in zip(mutants, pool.map(is_noticed, mutants), strict=True):
@@ -126,13 +136,15 @@ def tried(room: str, mutants: Sequence[tuple[str, Mutant]], jobs: int) -> Iterat
 
 
 def _runs(room: str, tree: Path) -> Runs:
-    """Run a room's tests once, and note which lines each runs."""
+    """Run a room's tests once, note which lines each runs, and leave compiled modules."""
     settings = tree / "coverage.ini"
     settings.write_text("[run]\nconcurrency = thread, greenlet\n")
     words = ["--cov", f"syncrelay/{room}", "--cov-context", "test", "--cov-report=", "--cov-config", str(settings)]
-    done = _pytest(tree, [*words, "--junitxml", "times.xml", "-m", _LEFT_OUT, *ROOMS[room]])
-    if done.returncode != 0:
-        raise SystemExit(f"the tests fail without a mutant:\n{done.stdout[-2000:]}")
+    words += ["--junitxml", "times.xml", "-m", _LEFT_OUT, *ROOMS[room]]
+    with closing(Forks(tree, room, ROOMS[room], {})) as forks:
+        done = forks.run(words, cpu_s=_ALL_S, wall_s=_WAITING * _ALL_S)
+    if done.code != 0:
+        raise SystemExit(f"the tests fail without a mutant:\n{done.output[-2000:]}")
     data = CoverageData(str(tree / ".coverage"))
     data.read()
     tests: dict[str, dict[int, list[str]]] = {}
@@ -150,48 +162,43 @@ def _runs(room: str, tree: Path) -> Runs:
     return Runs(tests, seconds)
 
 
-def _is_noticed(tree: Path, path: str, mutant: Mutant, runs: Runs, *, is_played: bool) -> bool:
+def _is_noticed(tree: Path, forks: Forks, path: str, mutant: Mutant, runs: Runs) -> bool:
     tests = runs.of(path, mutant)
     source = (ROOT / path).read_text()
     (tree / path).write_text(mutated(source, mutant))
     try:
-        if any(_fail(tree, part, runs) for part in (tests[:_FIRST], tests[_FIRST:]) if part):
+        if any(_fail(forks, part, runs) for part in (tests[:_FIRST], tests[_FIRST:]) if part):
             return True
-        if is_played:
+        if runs.are_played(path):
             return search(tree, seed=mutant.begin, cpu_s=_PLAYED_S).is_found
-        return bool(tests) and _fail(tree, _files(tests), runs)
+        return bool(tests) and _fail(forks, _files(tests), runs)
     finally:
         (tree / path).write_text(source)
 
 
-def _fail(tree: Path, tests: Sequence[str], runs: Runs) -> bool:
+def _fail(forks: Forks, tests: Sequence[str], runs: Runs) -> bool:
     """Whether one of some tests, or of the tests in some files, fails, hangs or cannot be imported."""
     asked = set(tests)
     usual = [seconds for test, seconds in runs.seconds.items() if asked & {test, *_files([test])}]
     longest = f"--timeout={_START_S + _PATIENCE * max(usual):.0f}"
-    try:
-        done = _pytest(tree, [longest, "-m", _LEFT_OUT, *tests], _START_S + _PATIENCE * sum(usual))
-    except subprocess.TimeoutExpired:
-        return True
-    if done.returncode == _REFUSED and tests != _files(tests):
+    cpu_s = _START_S + _PATIENCE * sum(usual)
+    done = forks.run([longest, "-p", "no:pytest_cov", "-m", _LEFT_OUT, *tests], cpu_s=cpu_s, wall_s=_WAITING * cpu_s)
+    if done.code == _REFUSED and tests != _files(tests):
         # Their files cannot be imported, or the mutant is in the names of tests.
-        return _fail(tree, _files(tests), runs)
-    if done.returncode not in (0, _FAILED, _REFUSED) and _NOT_IMPORTED not in done.stdout:
-        _say(f"pytest ended with {done.returncode}, which counts as nothing: {(done.stdout + done.stderr)[-2000:]}")
-    return done.returncode in (_FAILED, _REFUSED) or _NOT_IMPORTED in done.stdout
+        return _fail(forks, _files(tests), runs)
+    if _counts(done):
+        return True
+    if done.code != 0:
+        _say(f"pytest ended with {done.code}, which counts as nothing: {done.output[-2000:]}")
+    return False
+
+
+def _counts(done: Ended) -> bool:
+    return done.code in (None, _FAILED, _REFUSED) or _NOT_IMPORTED in done.output
 
 
 def _files(tests: Sequence[str]) -> list[str]:
     return sorted({test.partition("::")[0] for test in tests})
-
-
-def _pytest(tree: Path, words: Sequence[str], timeout_s: float | None = None) -> subprocess.CompletedProcess[str]:
-    # The first run leaves compiled modules to the others; a mutant could be as old and as long as the module itself.
-    compiles = {} if timeout_s is None else {"PYTHONDONTWRITEBYTECODE": "1"}
-    environ = {**os.environ, "PYTHONPATH": str(tree), **compiles}
-    return subprocess.run(
-        [*_PYTEST, *words], cwd=tree, env=environ, capture_output=True, text=True, timeout=timeout_s, check=False
-    )
 
 
 def _say(line: str) -> None:
