@@ -25,7 +25,6 @@ from typing import Final, NamedTuple
 _PYTEST: Final = ("-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "--no-header", "--tb=no")
 # Plugins are imported before pytest can rewrite their assertions.
 _QUIET: Final = ("-W", "ignore::pytest.PytestAssertRewriteWarning")
-_OWN: Final = ("syncrelay", "tests")
 # They start threads, and a process with threads is not to be forked.
 _WITH_THREADS: Final = ("rclpy", "pyarrow", "ray")
 
@@ -112,7 +111,7 @@ def _run(words: Sequence[str], output: int, cpu_s: int) -> None:
 
 def _import(room: str, tests: Sequence[str]) -> None:
     """Import what the room's tests need and no mutant changes."""
-    needs = {name: _imports(path) for name, path in _modules(Path("syncrelay"))}
+    needs = {name: _imports(path) | _around(name) for name, path in _modules(Path("syncrelay"))}
     inside = f"syncrelay.{room.replace('/', '.')}"
     left = {name for name in needs if f"{name}.".startswith(f"{inside}.")}
     changed = set(left)
@@ -121,7 +120,7 @@ def _import(room: str, tests: Sequence[str]) -> None:
         left |= more
     own = [path for name, path in _modules(Path("syncrelay")) if name.startswith(inside)]
     near = [path for each in tests for path in Path(each).rglob("*.py")]
-    foreign = {each for path in (*own, *near) for each in _imports(path) if _top(each) not in (*_OWN, *_WITH_THREADS)}
+    foreign = {each for path in (*own, *near) for each in _imports(path) if _is_foreign(each)}
     near_own = {each for path in near for each in _imports(path)}
     for name in ("pytest", *sorted(foreign), *sorted((needs.keys() & near_own) - left)):
         # Names in modules are among them, and what is not installed here.
@@ -133,8 +132,9 @@ def _import(room: str, tests: Sequence[str]) -> None:
         raise SystemExit("something that was imported has started a thread")
 
 
-def _top(name: str) -> str:
-    return name.partition(".")[0]
+def _is_foreign(name: str) -> bool:
+    top = name.partition(".")[0]
+    return top not in _WITH_THREADS and not Path(top).exists()
 
 
 def _modules(folder: Path) -> Iterator[tuple[str, Path]]:
@@ -151,7 +151,13 @@ def _imports(path: Path) -> set[str]:
             found.update(each.name for each in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
             found.update((node.module, *(f"{node.module}.{each.name}" for each in node.names)))
-    return {".".join(name.split(".")[:n]) for name in found for n in range(1, name.count(".") + 2)}
+    return found.union(*map(_around, found))
+
+
+def _around(name: str) -> set[str]:
+    """Return the packages that a module is in."""
+    parts = name.split(".")
+    return {".".join(parts[:count]) for count in range(1, len(parts))}
 
 
 if __name__ == "__main__":
