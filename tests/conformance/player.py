@@ -2,6 +2,7 @@
 
 import json
 import logging
+import os
 import re
 import struct
 from collections.abc import Callable, Mapping, Sequence
@@ -9,18 +10,26 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.serialization import deserialize_message
+from rclpy.time import Time
+
+from syncrelay.config import load_text
+from syncrelay.config.interfaces import Interfaces
 from syncrelay.config.profile import Profile
 from syncrelay.explain.facts import InputFacts
 from syncrelay.explain.judge import explanation
+from syncrelay.relay.listening import Heard, Listener
 from syncrelay.relay.ports import EndpointInfo
 from syncrelay.relay.relay import Relay
-from tests.conformance.script import VECTOR, Script
+from tests.conformance.script import PAIR, VECTOR, Script
 from tests.conformance.seen import MS, Seen, by_reason, endpoint, message, without_figures
 from tests.conformance.world import Reader, World, Writer
 from tests.ros.cdr_messages import vector
 from tests.simulated.running import Running
 
 _LOG: Final = logging.getLogger("syncrelay")
+_HOUR: Final = 3600 * 10**9
 # Whether a node's name comes before its publishers; and what is said again and again where a script takes long.
 _BY_CHANCE: Final = re.compile("not known yet|no (more )?sets? for ")
 
@@ -105,6 +114,52 @@ class Player:
         )
         self._world.runtime.start("relay", running.main)
         self._until(lambda: running.relay is not None or running.error, "the relay")
+
+    def listen(self, seconds: float) -> None:
+        """Somebody listens to the graph, as `syncrelay init` does; `heard` notes what came."""
+        node, backend = self._world.join(load_text(json.dumps({"version": 1, "groups": PAIR})), {})
+        found = Interfaces.find(os.environ)
+        listener = Listener(node, backend, seconds=seconds, interfaces=found, runtime=self._world.runtime)
+        self._heard: list[Heard] = []
+
+        def listened() -> None:
+            self._heard.append(listener.run())
+            node.leave()
+
+        self._world.runtime.start("listen", listened)
+
+    def heard(self) -> None:
+        """What was heard is noted."""
+        self._until(lambda: self._heard, "the end of listening")
+        heard, reliable = self._heard[0], {True: "reliable", False: "best_effort"}
+        vectors = [each for each in heard.topics if each.type == VECTOR]
+        places = sorted(place for each in vectors for place in each.places)
+        for each in vectors:
+            stamps = [None if stamp is None else (stamp - self._begin) / MS for stamp in each.stamps]
+            in_order = [*each.received] == sorted(each.received)
+            self._note(each.name, reliable[each.is_reliable], stamps, [*map(places.index, each.places)], in_order)
+        self._note("relayed", *heard.relayed)
+        self._note("without a header", *heard.headerless.items())
+        self._note("unusable", *heard.unusable)
+
+    def diagnosed(self, count: int) -> None:
+        """The last message on /diagnostics, once it tells of so many received messages, is noted."""
+        found: list[Any] = []
+
+        def is_told() -> bool:
+            reader = self._readers["/diagnostics"]
+            while (content := reader.take()) is not None:
+                found[:] = [deserialize_message(content, DiagnosticArray)]
+            told = [value.value for each in found for status in each.status for value in status.values]
+            return str(count) in told
+
+        self._until(is_told, f"a diagnosis of {count} messages", lambda: found)
+        self._note("stamped", abs(Time.from_msg(found[0].header.stamp).nanoseconds - self._begin) < _HOUR)
+        for status in found[0].status:
+            told = {each.key: each.value for each in status.values if each.key != "suggestion"}
+            values = [f"{key}={value if value.isdigit() else self._blank(value)}" for key, value in told.items()]
+            level = int.from_bytes(status.level, "little")
+            self._note("diagnosed", status.name, level, status.hardware_id, *values)
 
     def file(self, groups: Mapping[str, Any], *, node: Mapping[str, Any] | None = None) -> None:
         """The relay's file is written."""
