@@ -4,9 +4,8 @@
 
 Of each room so many mutants are drawn, or all are taken. For each the tests that run its lines are run, the quickest
 first, in a copy of the tree, until one fails; then the files that hold them, as what a fixture makes once is looked at
-by others, or for a room of the relay worlds drawn by seeds, if worlds run its module. Where only an import runs its
-lines, all tests of the room are run. A mutant that hangs and one that cannot be imported is noticed too. What lives is
-printed.
+by others, or worlds drawn by seeds for a module of the relay. Where only an import runs its lines, all tests of the
+room are run. A mutant that hangs and one that cannot be imported is noticed too. What lives is printed.
 """
 
 import argparse
@@ -32,18 +31,17 @@ from tests.mutants.mutations import Mutant, mutants_of, mutated
 from tests.simulated.finding import search
 
 ROOT: Final = Path(__file__).parents[2]
-# The whole relay on a simulated ROS: what a script shows is known, and a world must keep its promises.
-_PLAYED: Final = ("tests/conformance", "tests/simulated")
-_WORLDS: Final = "tests/simulated/test_worlds.py"
+# The whole relay on a simulated ROS. Where scripts run a module, worlds are played too.
+_PLAYED: Final = "tests/conformance"
 ROOMS: Final = {
     "sync": ["tests/sync"],
     "explain": ["tests/explain", "tests/status", "tests/cli/test_tap.py"],
-    "dataflow": ["tests/dataflow", "tests/sync", "tests/status", *_PLAYED],
-    "relay": ["tests/dataflow", "tests/status", *_PLAYED],
+    "dataflow": ["tests/dataflow", "tests/sync", "tests/status", _PLAYED],
+    "relay": ["tests/dataflow", "tests/status", _PLAYED],
     "recordings/bag": ["tests/recordings/bag", "tests/recordings/analysis", "tests/recordings/datasets"],
 }
 # Each for so many seconds of CPU.
-_PLAYED_S: Final = 30.0
+_PLAYED_S: Final = 15.0
 _LEFT_OUT: Final = "not (ros or browser or peer or process or real_data)"
 # How pytest ends where a test fails; and where a test is not found, or a conftest.py cannot be imported.
 _FAILED: Final = 1
@@ -58,6 +56,8 @@ _ALL_S: Final = 900.0
 _MEMORY: Final = 8 << 30
 # So many tests are tried first: most mutants end there.
 _FIRST: Final = 30
+# After so many it is said how many were noticed: a run may be cut short.
+_TOLD: Final = 10
 
 
 class Runs(NamedTuple):
@@ -77,7 +77,7 @@ class Runs(NamedTuple):
 
     def are_played(self, path: str) -> bool:
         """Whether worlds run a file."""
-        return any(test.startswith(_WORLDS) for tests in self.tests.get(path, {}).values() for test in tests)
+        return any(test.startswith(_PLAYED) for tests in self.tests.get(path, {}).values() for test in tests)
 
     def _quickest(self, tests: set[str]) -> list[str]:
         return sorted(tests, key=lambda test: (self.seconds.get(test, 0.0), test))
@@ -94,7 +94,11 @@ def main() -> int:
     for room in asked.rooms:
         _say(f"== {room}")
         mutants = drawn(room, asked.sample, asked.seed)
-        noticed = sum(tried(room, mutants, asked.jobs))
+        noticed = 0
+        for number, is_noticed in enumerate(tried(room, mutants, asked.jobs), 1):
+            noticed += is_noticed
+            if number % _TOLD == 0:
+                _say(f"{room}: {noticed} of {number} so far")
         _say(f"{room}: {noticed} of {len(mutants)} mutants noticed, {noticed / max(1, len(mutants)):.1%}")
     return 0
 

@@ -10,14 +10,16 @@ from math import ceil
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from syncrelay.explain import explanation
+from syncrelay.status import Phase
 from tests.simulated.bus import Reader, Sample, Writer
 from tests.simulated.faults import KINDS, concerns, is_felt
 from tests.simulated.plan import HEALED_S, NAMED_S, SETTLED_S, TYPE, Group, Plan, Step
 from tests.simulated.scheduler import SECOND
-from tests.simulated.world import World, identity
+from tests.simulated.world import RelayProcess, World, identity
 
 if TYPE_CHECKING:
     from syncrelay.explain import GroupReport, InputGraph
+    from syncrelay.relay.relay import Relay
 
 # After what is odd, so long; sets may be missing so long before a fault began.
 _AGAIN_S: Final = 15.0
@@ -30,6 +32,9 @@ _JUDGED_S: Final = 12.0
 _ABOUT_TO_SEND_S: Final = 4.5
 _HERE_S: Final = 8.0
 _NAMED_BY_S: Final = 45.0
+# The phase is shown by then.
+_SHOWN_BY_S: Final = 5.0
+_PAUSES: Final = ("pause", "resume")
 # What DDS refuses on a topic is asked for again no more often than this, in so long, and by each reload.
 _TRIES: Final = 12
 _TRIED_S: Final = 10.0
@@ -119,6 +124,7 @@ class Promises:
         self._judged: dict[str, float] = {}
         self._nameless: dict[tuple[str, str], float] = {}
         self._fed: dict[str, int] = {}
+        self._misled: float | None = None
         self._taken: dict[str, dict[Reader, dict[bytes, list[int]]]] = defaultdict(lambda: defaultdict(dict))
         world.bus.written = self._on_write
         world.bus.taken = self._on_taken
@@ -166,8 +172,9 @@ class Promises:
         """Take in what the relay reports now."""
         running = self.world.relay
         relay = running.relay if running is not None else None
-        if relay is None:
+        if running is None or relay is None:
             return
+        self._look_at_phase(running, relay)
         for report in relay.monitor.reports:
             name = report.facts.name
             if self._reports.get(name) is report:
@@ -191,6 +198,23 @@ class Promises:
             self._look_for_punctual(name, [text for _, _, text in told])
             if len(set(told)) < len(told):
                 self.broken.append(f"{self.world.now:.2f} s: {name}: a finding is there twice: {told}")
+
+    def _look_at_phase(self, running: RelayProcess, relay: "Relay") -> None:
+        """Look whether the relay shows another phase than the one it was brought to, for longer than that takes."""
+        node, now = running.node, self.world.now
+        asked = [name for _, name, answer in self.world.answers if name in _PAUSES and answer and answer.success]
+        awake = Phase.PAUSED if asked and asked[-1] == "pause" else Phase.RUNNING
+        state = node.state if node is not None and self.world.plan.is_managed else "active"
+        expected = awake if state == "active" else Phase(state)
+        shown = relay._phase  # noqa: SLF001  to ask for the state has all groups evaluated each second
+        pending = any(answer is None for *_, answer in self.world.answers)
+        if running.requested or pending or shown is expected or self._happened({"stall"}, now - _SHOWN_BY_S, now):
+            self._misled = None
+        elif self._misled is None:
+            self._misled = now
+        elif now - self._misled > _SHOWN_BY_S:
+            self.broken.append(f"{now:.2f} s: the relay is {shown.value}, not {expected.value}")
+            self._misled = None
 
     def _look_for_punctual(self, name: str, texts: Iterable[str]) -> None:
         """Look whether somebody is called silent who has more time to send."""

@@ -415,6 +415,7 @@ class SimulatedRuntime:
         self.scheduler = scheduler = process.scheduler
         self.time_ns = process.time_ns
         self.sleep = scheduler.sleep
+        self._threads: dict[str, SimulatedThread] = {}
         self._used = 0
 
     def monotonic(self) -> float:
@@ -438,4 +439,9 @@ class SimulatedRuntime:
         return SimulatedFuture(self.scheduler)
 
     def start(self, name: str, target: Callable[[], object], *, daemon: bool = False) -> SimulatedThread:  # noqa: ARG002
-        return SimulatedThread(self.scheduler, name, target, self.process)
+        thread = self._threads[name] = SimulatedThread(self.scheduler, name, target, self.process)
+        return thread
+
+    def alive(self) -> list[str]:
+        """Return the names of the threads that have not ended, the last of each name."""
+        return [name for name, thread in self._threads.items() if thread.is_alive()]

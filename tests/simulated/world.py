@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 OTHER_TYPE: Final = "geometry_msgs/msg/PointStamped"
 _TICK: Final = 50 * MS
+_FILES: Final = "syncrelay-files"
 # Calls after which a relay that is paused or inactive is so still.
 _SENDS_NOTHING_NEW: Final = frozenset({"status", "reload", "pause", "deactivate"})
 # Moments begin here, some time before the world does.
@@ -193,6 +194,8 @@ class RelayProcess(Running):
         self.process = Process(world.scheduler, "relay")
         self.process.clock_offset = world.clock_offset
         self.node: SimulatedNode | None = None
+        self.left: list[str] = []
+        """The threads that had not ended when it had. A file that is being read is not waited for."""
         self._world, self._simulated = world, SimulatedRuntime(self.process)
         super().__init__(
             path,
@@ -202,6 +205,10 @@ class RelayProcess(Running):
             drained=lambda: world.drained(),  # noqa: PLW0108  it may be another then
         )
         world.scheduler.start("main", self.main, self.process)
+
+    def main(self) -> None:
+        super().main()
+        self.left = [name for name in self._simulated.alive() if name != _FILES]
 
     def _joined(self, config: Config) -> tuple[SimulatedNode, SimulatedBackend]:
         participant = self._world.bus.participant(self.process)
