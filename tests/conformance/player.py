@@ -47,21 +47,26 @@ class _Running(Running):
         self.has_ended = True
 
 
-class _Recorder(logging.Handler):
+class Recorder(logging.Handler):
+    """The relay's log."""
+
     def __init__(self) -> None:
-        super().__init__(logging.WARNING)
+        super().__init__(logging.INFO)
         self.texts: list[str] = []
+        self.warnings: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        text = record.getMessage()
-        self.texts.append(text if not record.exc_info else f"{text}\n{record.exc_info[1]!r}")
+        text = record.getMessage() + (f"\n{record.exc_info[1]!r}" if record.exc_info else "")
+        self.texts.append(text)
+        if record.levelno >= logging.WARNING:
+            self.warnings.append(text)
 
 
 class Player:
     """The verbs of scripts. Times in scripts are milliseconds from the script's begin."""
 
-    def __init__(self, world: World, folder: Path, texts: Sequence[str]) -> None:
-        self._world, self._folder, self._texts = world, folder, texts
+    def __init__(self, world: World, folder: Path, recorder: Recorder) -> None:
+        self._world, self._folder, self._recorder = world, folder, recorder
         self._begin = world.runtime.time_ns()
         self._writers: dict[str, tuple[Writer, str]] = {}
         self._readers: dict[str, Reader] = {}
@@ -364,8 +369,8 @@ class Player:
         self._note("reload error", self._blank(self._relay.state().reload_error or ""))
 
     def says(self, words: str) -> None:
-        """The relay has warned in these words."""
-        self._until(lambda: any(words in each for each in self._texts), words)
+        """The relay's log has these words."""
+        self._until(lambda: any(words in each for each in self._recorder.texts), words)
 
     def phase(self, phase: str) -> None:
         """The relay is in this phase."""
@@ -395,7 +400,7 @@ class Player:
             self.stop()
         for name in self._readers:
             self._taken(name)
-        self.seen.log = sorted({self._blank(each) for each in self._texts if not _BY_CHANCE.search(each)})
+        self.seen.log = sorted({self._blank(each) for each in self._recorder.warnings if not _BY_CHANCE.search(each)})
         return self.seen
 
     def abandon(self) -> None:
@@ -471,10 +476,10 @@ class Player:
 
 def play(script: Script, world: World, folder: Path) -> Seen:
     """Play a script in a ROS."""
-    recorder, level = _Recorder(), _LOG.level
+    recorder, level = Recorder(), _LOG.level
     _LOG.addHandler(recorder)
     _LOG.setLevel(logging.INFO)
-    player = Player(world, folder, recorder.texts)
+    player = Player(world, folder, recorder)
     try:
         for step in script.steps:
             getattr(player, step.verb)(*step.words, **step.keys)

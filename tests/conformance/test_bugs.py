@@ -8,6 +8,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from syncrelay.config import GroupConfig
 from syncrelay.relay.groups import Groups
+from syncrelay.relay.relay import Relay
 from syncrelay.sync.group import SyncGroup
 from tests.conformance.player import play
 from tests.conformance.script import PAIR, do, group, short
@@ -90,3 +91,14 @@ def test_one_in_the_end_of_a_group_is_told_once_and_leaves_the_others_theirs(mon
     assert ends[0][1:] == ("front", [("/a", 2, 0, {"shutdown": 2}), ("/b", 0, 0, {})])
     assert [each[1] for each in ends] == ["front", "broken"]
     assert sum("stopped this group; other groups keep running" in each for each in seen.log) == 1
+
+
+def test_one_in_a_turn_ends_the_relay_with_all_its_threads(monkeypatch, tmp_path):
+    def failing(_):
+        raise ZeroDivisionError("no turn")
+
+    monkeypatch.setattr(Relay, "step", failing)
+    with SimulatedWorld(1) as world:
+        with pytest.raises(ZeroDivisionError):
+            play(short("a bug", do.relay(PAIR), do.sleep(1), do.call("status")), world, tmp_path)
+        assert not [name for name in world.runtime.alive() if name.startswith("syncrelay-") and "files" not in name]
