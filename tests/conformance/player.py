@@ -372,6 +372,11 @@ class Player:
         """The relay's log has these words."""
         self._until(lambda: any(words in each for each in self._recorder.texts), words)
 
+    def settled(self) -> None:
+        """No topic is polled any more until the graph changes, or what was refused is due again."""
+        topics = self._relay._groups.bindings.topics  # noqa: SLF001
+        self._until(lambda: not any(each.is_due for each in topics), "topics that need not be polled")
+
     def phase(self, phase: str) -> None:
         """The relay is in this phase."""
         self._until(lambda: self._reports() is not None and self._relay.state().phase.value == phase, f"phase {phase}")

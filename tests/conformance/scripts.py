@@ -73,7 +73,7 @@ def _refused_qos(offered: dict[str, Any], **asked: Any) -> tuple[Any, ...]:
 # A script is read as a few lines, which one step a line would not be.
 _QOS: Final = (
     short("sets leave in order",
-        _RIG, do.sets(10, 20, 30), _out(3), do.counts(),
+        _RIG, do.sets(10, 20, 30), _out(3), do.settled(), do.counts(),
         do.endpoints("/front/a", publishers=1, subscribers=1)),
     short("a relay that starts before its publishers subscribes as they come",
         do.relay(PAIR), do.endpoints("/a", publishers=0, subscribers=0),
@@ -227,7 +227,7 @@ _GRAPH: Final = (
     short("a topic that the relay's own process holds with another type is refused",
         _SENSORS, do.relay(PAIR, node={"lifecycle": True}), do.hold("/front/a", POINT),
         do.transit("configure", "activate"), do.finding("refused_by_dds", wordless=True),
-        do.endpoints("/front/a", publishers=1), do.endpoints("/front/b", publishers=1)),
+        do.settled(), do.endpoints("/front/a", publishers=1), do.endpoints("/front/b", publishers=1)),
     short("names are remapped, and the node is in a namespace",
         do.publisher("/robot/cam"), do.publisher("/b", name="/b"),
         do.relay(_front("a", "/b", output_prefix="/fused"),

@@ -40,13 +40,13 @@ ROOMS: Final = {
     "relay": ["tests/dataflow", "tests/status", _PLAYED],
     "recordings/bag": ["tests/recordings/bag", "tests/recordings/analysis", "tests/recordings/datasets"],
 }
-# Each for so many seconds of CPU.
-_PLAYED_S: Final = 15.0
 _LEFT_OUT: Final = "not (ros or browser or peer or process or real_data)"
 # How pytest ends where a test fails; and where a test is not found, or a conftest.py cannot be imported.
 _FAILED: Final = 1
 _REFUSED: Final = 4
 _NOT_IMPORTED: Final = "during collection"
+# It may come while pytest writes, which then ends as by a fault of its own.
+_TOO_LONG: Final = "from pytest-timeout"
 # Tests of a mutant may take so many times as long as usual, and so much more to begin; where they wait, longer.
 _PATIENCE: Final = 5
 _START_S: Final = 20.0
@@ -88,6 +88,8 @@ def main() -> int:
     parser.add_argument("--rooms", nargs="+", choices=ROOMS, default=list(ROOMS), metavar="ROOM")
     parser.add_argument("--sample", type=int, help="mutants of each room; all if it is left out")
     parser.add_argument("--seed", type=int, default=1)
+    worlds = "seconds of CPU in which worlds look for each that tests of the relay leave alive"
+    parser.add_argument("--worlds", type=float, default=15.0, metavar="SECONDS", help=worlds)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     asked = parser.parse_args()
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
@@ -95,7 +97,7 @@ def main() -> int:
         _say(f"== {room}")
         mutants = drawn(room, asked.sample, asked.seed)
         noticed = 0
-        for number, is_noticed in enumerate(tried(room, mutants, asked.jobs), 1):
+        for number, is_noticed in enumerate(tried(room, mutants, asked.jobs, worlds_s=asked.worlds), 1):
             noticed += is_noticed
             if number % _TOLD == 0:
                 _say(f"{room}: {noticed} of {number} so far")
@@ -112,7 +114,7 @@ def drawn(room: str, count: int | None, seed: int) -> list[tuple[str, Mutant]]:
     return found
 
 
-def tried(room: str, mutants: Sequence[tuple[str, Mutant]], jobs: int) -> Iterator[bool]:
+def tried(room: str, mutants: Sequence[tuple[str, Mutant]], jobs: int, *, worlds_s: float) -> Iterator[bool]:
     """Yield of each mutant of a room whether the tests notice it, and print those that live."""
     with tempfile.TemporaryDirectory(prefix="syncrelay-mutants-") as folder, ExitStack() as opened:
         first = Path(folder, "0")
@@ -128,7 +130,7 @@ def tried(room: str, mutants: Sequence[tuple[str, Mutant]], jobs: int) -> Iterat
         def is_noticed(tried: tuple[str, Mutant]) -> bool:
             tree, forks = trees.get()
             try:
-                return _is_noticed(tree, forks, *tried, runs)
+                return _is_noticed(tree, forks, *tried, runs, worlds_s=worlds_s)
             finally:
                 trees.put((tree, forks))
 
@@ -166,7 +168,7 @@ def _runs(room: str, tree: Path) -> Runs:
     return Runs(tests, seconds)
 
 
-def _is_noticed(tree: Path, forks: Forks, path: str, mutant: Mutant, runs: Runs) -> bool:
+def _is_noticed(tree: Path, forks: Forks, path: str, mutant: Mutant, runs: Runs, *, worlds_s: float) -> bool:
     tests = runs.of(path, mutant)
     source = (ROOT / path).read_text()
     (tree / path).write_text(mutated(source, mutant))
@@ -174,7 +176,7 @@ def _is_noticed(tree: Path, forks: Forks, path: str, mutant: Mutant, runs: Runs)
         if any(_fail(forks, part, runs) for part in (tests[:_FIRST], tests[_FIRST:]) if part):
             return True
         if runs.are_played(path):
-            return search(tree, seed=mutant.begin, cpu_s=_PLAYED_S).is_found
+            return search(tree, seed=mutant.begin, cpu_s=worlds_s).is_found
         return bool(tests) and _fail(forks, _files(tests), runs)
     finally:
         (tree / path).write_text(source)
@@ -198,7 +200,7 @@ def _fail(forks: Forks, tests: Sequence[str], runs: Runs) -> bool:
 
 
 def _counts(done: Ended) -> bool:
-    return done.code in (None, _FAILED, _REFUSED) or _NOT_IMPORTED in done.output
+    return done.code in (None, _FAILED, _REFUSED) or any(each in done.output for each in (_NOT_IMPORTED, _TOO_LONG))
 
 
 def _files(tests: Sequence[str]) -> list[str]:

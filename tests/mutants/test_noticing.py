@@ -34,6 +34,6 @@ def test_what_counts_as_noticed(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     monkeypatch.setenv("PYTEST_PLUGINS", "pytest_timeout,pytest_cov.plugin")
     drawn = mutants.drawn("sync", None, 1)
-    tried = mutants.tried("sync", drawn, 1)
+    tried = mutants.tried("sync", drawn, 1, worlds_s=0.0)
     noticed = {(each.line, each.after): is_noticed for (_, each), is_noticed in zip(drawn, tried, strict=True)}
     assert noticed == {(2, "(3)"): False, (3, "(5)"): True, (7, "return None"): True}
