@@ -41,14 +41,6 @@ def test_a_silence_is_said_with_its_reason_and_what_to_do():
     assert looked(FindingLog(), at(17, last_set=10))[0].text == f"no more sets for 7 s: {WHY}"
 
 
-def test_a_clock_that_is_set_back_delays_nothing():
-    log = FindingLog()
-    assert told(log, range(1, 21), last_set=lambda _: None) == [5, 10, 20]
-    began = BEGAN - 3600 * S
-    silent = [at(second, last_set=None, began=began) for second in range(-3579, -3539)]
-    assert [number for number, facts in enumerate(silent) if looked(log, facts)] == [20]
-
-
 def test_its_end_is_said_once():
     silence = FindingLog()
     looked(silence, at(5, last_set=None))
@@ -108,3 +100,27 @@ def test_what_another_finding_explains_is_not_over():
 @pytest.mark.parametrize(("suggestion", "line"), [(None, "so it is"), ("do this", "so it is; do this")])
 def test_a_finding_is_one_line(suggestion, line):
     assert in_words(Finding(Code.HEALTHY, Severity.OK, "so it is", suggestion)) == line
+
+
+# When the group gives sets, and when stamps repeat: both come back within a minute and after more.
+WELL = (range(50, 75), range(100, 170), range(190, 300))
+REPEATING = (range(52, 60), range(105, 135), range(200, 240))
+
+
+def played(set_back: int):
+    """What is said, and when, with a clock that is set back by an hour in this second."""
+    log, lines, last_set = FindingLog(), list[tuple[int, str]](), None
+    for second in range(1, 300):
+        by = 3600 if second >= set_back else 0
+        last_set = second if any(second in each for each in WELL) else last_set
+        facts = at(second - by, last_set=None if last_set is None else last_set - by, began=BEGAN - by * S)
+        found = (REPEATS,) if any(second in each for each in REPEATING) else ()
+        lines += [(second, each.text.partition(" ")[0]) for each in log.remarks(facts, (*judge(facts), *found))]
+    return lines
+
+
+@pytest.mark.parametrize("set_back", [3, 30, 55, 58, 62, 90, 110, 138, 150, 172, 210, 242])
+def test_a_clock_that_is_set_back_delays_nothing_by_more_than_a_look(set_back):
+    usual, lines = played(1000), played(set_back)
+    assert [text for _, text in lines] == [text for _, text in usual]
+    assert all(0 <= later - sooner <= 2 for (sooner, _), (later, _) in zip(usual, lines, strict=True))
