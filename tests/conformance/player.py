@@ -20,7 +20,7 @@ from syncrelay.config.profile import Profile
 from syncrelay.explain.facts import InputFacts
 from syncrelay.explain.judge import explanation
 from syncrelay.relay.listening import Heard, Listener
-from syncrelay.relay.ports import EndpointInfo
+from syncrelay.relay.ports import EndpointInfo, Purpose
 from syncrelay.relay.relay import Relay
 from tests.conformance.script import PAIR, VECTOR, Script
 from tests.conformance.seen import MS, Seen, by_reason, endpoint, message, without_figures
@@ -146,6 +146,28 @@ class Player:
         self._note("relayed", *heard.relayed)
         self._note("without a header", *heard.headerless.items())
         self._note("unusable", *heard.unusable)
+
+    def observe(self, groups: Mapping[str, Any], seconds: float) -> None:
+        """Somebody observes groups, as `syncrelay observe` does; `observed` notes what it reports."""
+        config = load_text(json.dumps({"version": 1, "groups": groups}))
+        node, backend = self._world.join(config, {}, Purpose.OBSERVE)
+        self._observed: list[Any] = []
+
+        def look() -> None:
+            runtime, purpose = self._world.runtime, Purpose.OBSERVE
+            with Relay(config, node, backend, purpose=purpose, runtime=runtime) as relay:
+                self._observed.append(relay.look(seconds))
+
+        self._world.runtime.start("observe", look)
+
+    def observed(self) -> None:
+        """What was observed is noted."""
+        self._until(lambda: self._observed, "the end of observing")
+        for report in self._observed[0]:
+            self._note("observed", report.facts.name)
+            for each in report.facts.inputs:
+                counts = each.counts
+                self._note(each.name, counts.fed, counts.matched, by_reason(counts.dropped), each.graph.largest)
 
     def diagnosed(self, count: int) -> None:
         """The last message on /diagnostics, once it tells of so many received messages, is noted."""

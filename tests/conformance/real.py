@@ -14,7 +14,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 
 from syncrelay.config.profile import Profile
-from syncrelay.relay.ports import Node
+from syncrelay.relay.ports import Node, Purpose
 from syncrelay.relay.types import import_type
 from syncrelay.ros.graph import RosGraph
 from syncrelay.ros.joining import joined
@@ -145,9 +145,9 @@ class RealWorld:
             os.kill(player.process.pid, 9)
             player.process.wait()
 
-    def join(self, config: Any, names: Mapping[str, str]) -> tuple[Any, Any]:
+    def join(self, config: Any, names: Mapping[str, str], purpose: Purpose = Purpose.RELAY) -> tuple[Any, Any]:
         ros_args = [word for old, new in names.items() for word in ("-r", f"{old}:={new}")]
-        return joined(config, ros_args=ros_args, is_managed=config.node.lifecycle)
+        return joined(config, ros_args=ros_args, purpose=purpose, is_managed=config.node.lifecycle)
 
     def hold(self, node: Any, topic: str, type_name: str) -> None:
         self._held.append(node.raw.create_publisher(import_type(type_name), topic, 1))

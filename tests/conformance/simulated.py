@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Self
 
 from syncrelay.config.profile import Profile
-from syncrelay.relay.ports import Node
+from syncrelay.relay.ports import Node, Purpose
 from syncrelay.relay.types import import_type
 from tests.simulated.bus import Bus, BusNode, Participant, Reader, Weather, Writer
 from tests.simulated.node import SimulatedBackend, SimulatedGraph, SimulatedNode
@@ -70,12 +70,13 @@ class SimulatedWorld:
             del self._nodes[key]
         return self._participants.pop(by)
 
-    def join(self, config: Any, names: Mapping[str, str]) -> tuple[Any, Any]:
+    def join(self, config: Any, names: Mapping[str, str], purpose: Purpose = Purpose.RELAY) -> tuple[Any, Any]:
         self._relays = self._bus.participant(self.process)
         node = SimulatedNode(
             self._relays,
             self.runtime,
-            name=names.get("__node", config.node.name),
+            # Names that begin so are hidden from lists.
+            name="_observer" if purpose is Purpose.OBSERVE else names.get("__node", config.node.name),
             namespace=names.get("__ns", config.node.namespace),
             is_simulated=config.node.use_sim_time,
             remaps=names,

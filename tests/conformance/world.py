@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from syncrelay.config.profile import Profile
-from syncrelay.relay.ports import Graph, Node
+from syncrelay.relay.ports import Graph, Node, Purpose
 from syncrelay.runtime import Runtime
 
 
@@ -71,7 +71,7 @@ class World(Protocol):
         """Have a process end by SIGKILL."""
         ...
 
-    def join(self, config: Any, names: Mapping[str, str]) -> tuple[Any, Any]:
+    def join(self, config: Any, names: Mapping[str, str], purpose: Purpose = Purpose.RELAY) -> tuple[Any, Any]:
         """Have the relay's node join, with these remaps; the node and its backend."""
         ...
 
