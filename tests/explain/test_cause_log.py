@@ -169,3 +169,28 @@ def test_a_cause_of_the_relay_is_one_line_for_all_groups_unless_it_is_about_an_i
     lines = [line.text for line in log.lines(now=7 * S)]
     assert len(lines) == (1 if about is None else 2)
     assert about is not None or lines[0] == "2 groups (front and rear): so it is"
+
+
+def _heard(log: CauseLog, second: int, *warned: str) -> list[str]:
+    """What the log says after both groups were judged, of which these warn of the driver that they share."""
+    found = Finding(Code.DUPLICATES, Severity.WARN, "stamps repeat", input=0)
+    for name in ("front", "rear"):
+        remarks = [Remark(Severity.WARN, found.text, (found,))] if name in warned else []
+        log.hear(a_group(an_input("/camera"), name=name), (found,), remarks, now=second * S)
+    return [line.text for line in log.lines(now=second * S + 1)]
+
+
+@pytest.mark.parametrize("is_over", [True, False])
+def test_a_cause_is_news_again_after_a_minute_unless_another_group_has_it_still(is_over):
+    log = CauseLog()
+    log.watch(["front", "rear"])
+    seconds = [second for second in range(1, 190) if _heard(log, second, "front", "rear")]
+    assert seconds == [2, 6, 16, 36, 76, 156]
+    if is_over:
+        found = Finding(Code.DUPLICATES, Severity.WARN, "stamps repeat", input=0)
+        log.hear(a_group(an_input("/camera"), name="front"), (), [Remark(Severity.OK, "over", (found,))], now=190 * S)
+        assert [line.text for line in log.lines(now=190 * S, is_last=True)] == ["front: over"]
+    assert not _heard(log, 200)
+    assert [second for second in range(260, 300) if _heard(log, second, "rear")] == (
+        [261, 265, 275, 295] if is_over else []
+    )

@@ -9,7 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.config import Distance
-from syncrelay.explain.nearest import NearestSpans, signed_distances
+from syncrelay.explain.nearest import NearestSpans, as_arrays, possible_sets, signed_distances
+from syncrelay.sync import Message
+from tests.explain.scenario import BEGAN, MS, Source, group_of
 
 STAMPS = st.lists(st.integers(0, 60), min_size=1, max_size=7, unique=True).map(sorted)
 STREAMS = st.lists(STAMPS, min_size=2, max_size=4)
@@ -72,6 +74,16 @@ def test_the_distance_to_the_nearest_of_others_is_known_of_what_lies_among_them(
     among = [stamp for stamp in stamps if others[0] < stamp <= others[-1]]
     nearest = [min((other - stamp for other in others), key=lambda by: (abs(by), by)) for stamp in among]
     assert signed_distances(np.array(stamps), np.array(others)).tolist() == nearest
+
+
+def test_a_message_is_in_one_possible_set_at_most_the_tightest():
+    slow, fast = [*range(0, 1000, 100), 503], [at + 2 for at in range(0, 1000, 50)]
+    came = sorted([(at, 0) for at in slow] + [(at, 1) for at in fast])
+    messages = [Message(index, BEGAN + at * MS, BEGAN + at * MS) for at, index in came]
+    group = group_of([Source("/slow", 1), Source("/fast", 1)], {"policy": "approximate_time", "slop": "5ms"})
+    found = possible_sets(group, as_arrays(messages, 2), (0, 1), is_window=False)
+    assert found is not None
+    assert ((found.stamps - BEGAN) // MS).tolist() == [at for at in sorted(slow) if at != 500]
 
 
 def test_a_message_is_measured_once_something_on_every_input_is_not_older():
