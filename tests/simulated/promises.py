@@ -18,6 +18,7 @@ from tests.simulated.scheduler import SECOND
 from tests.simulated.world import RelayProcess, World, identity
 
 if TYPE_CHECKING:
+    from syncrelay.dataflow.group import GroupRelay
     from syncrelay.explain import GroupReport, InputGraph
     from syncrelay.relay.relay import Relay
 
@@ -125,6 +126,7 @@ class Promises:
         self._nameless: dict[tuple[str, str], float] = {}
         self._fed: dict[str, int] = {}
         self._misled: float | None = None
+        self._running: set[GroupRelay] = set()
         self._taken: dict[str, dict[Reader, dict[bytes, list[int]]]] = defaultdict(lambda: defaultdict(dict))
         world.bus.written = self._on_write
         world.bus.taken = self._on_taken
@@ -175,6 +177,7 @@ class Promises:
         if running is None or relay is None:
             return
         self._look_at_phase(running, relay)
+        self._look_at_ended(relay)
         for report in relay.monitor.reports:
             name = report.facts.name
             if self._reports.get(name) is report:
@@ -215,6 +218,14 @@ class Promises:
         elif now - self._misled > _SHOWN_BY_S:
             self.broken.append(f"{now:.2f} s: the relay is {shown.value}, not {expected.value}")
             self._misled = None
+
+    def _look_at_ended(self, relay: "Relay") -> None:
+        """Look whether something still waits in a group that runs no more."""
+        running = set(relay._groups.bindings.groups)  # noqa: SLF001  reports are of those that run
+        for group in self._running - running:
+            if any(each.buffered for each in group.counts()):
+                self.broken.append(f"{self.world.now:.2f} s: {group.config.name} has ended with {group.counts()}")
+        self._running = running
 
     def _look_for_punctual(self, name: str, texts: Iterable[str]) -> None:
         """Look whether somebody is called silent who has more time to send."""
