@@ -7,6 +7,7 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from syncrelay.config import GroupConfig
+from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.relay.groups import Groups
 from syncrelay.relay.relay import Relay
 from syncrelay.sync.group import SyncGroup
@@ -93,12 +94,15 @@ def test_one_in_the_end_of_a_group_is_told_once_and_leaves_the_others_theirs(mon
     assert sum("stopped this group; other groups keep running" in each for each in seen.log) == 1
 
 
-def test_one_in_a_turn_ends_the_relay_with_all_its_threads(monkeypatch, tmp_path):
+@pytest.mark.parametrize(("owner", "name"), [(Relay, "step"), (ReceiveLoop, "run")])
+def test_one_that_ends_the_main_or_the_receive_thread_ends_the_relay_with_all_others(
+    owner, name, monkeypatch, tmp_path
+):
     def failing(_):
         raise ZeroDivisionError("no turn")
 
-    monkeypatch.setattr(Relay, "step", failing)
+    monkeypatch.setattr(owner, name, failing)
     with SimulatedWorld(1) as world:
         with pytest.raises(ZeroDivisionError):
-            play(short("a bug", do.relay(PAIR), do.sleep(1), do.call("status")), world, tmp_path)
-        assert not [name for name in world.runtime.alive() if name.startswith("syncrelay-") and "files" not in name]
+            play(short("a bug", do.relay(PAIR), do.sleep(2), do.call("status")), world, tmp_path)
+        assert not [each for each in world.runtime.alive() if each.startswith("syncrelay-") and "files" not in each]
