@@ -6,7 +6,7 @@ import time
 import pytest
 
 from syncrelay.dataflow.observers import Discovery, Losses, SimulatedClock, Standstills, SystemClock, Waits
-from syncrelay.explain import ClockState, Standstill
+from syncrelay.explain import ClockState, Standstill, Step
 from syncrelay.runtime import SystemRuntime
 
 _SECOND = 1_000_000_000
@@ -49,7 +49,7 @@ def test_the_longest_wait_is_told_for_ten_evaluations():
 
 
 # Evaluations after which a publisher that was found has found the subscription, too.
-_SETTLED = [(0, 1)] * 6
+_SETTLED = [(0, 1)] * 5
 
 
 @pytest.mark.parametrize(
@@ -57,6 +57,7 @@ _SETTLED = [(0, 1)] * 6
     [
         pytest.param([*_SETTLED, (4, 1), (5, 1)], 5, 5, id="what is lost of a known publisher counts"),
         pytest.param([(8, 1)] * 8, 0, 0, id="what a first publisher sent before counts not"),
+        pytest.param([*_SETTLED[1:], (4, 1), (5, 1)], 1, 1, id="nor what it sends before five evaluations"),
         pytest.param([*_SETTLED, (6, 2), (7, 2)], 0, 0, id="nor what a second one sent before"),
         pytest.param([*_SETTLED, (3, 1), *[(1, 1)] * 6, (2, 1)], 1, 4, id="a new subscription counts from 0"),
         pytest.param([*_SETTLED, (3, 1), *[(3, 1)] * 10], 0, 3, id="after ten evaluations it counts in all only"),
@@ -70,28 +71,39 @@ def test_only_what_a_known_publisher_lost_of_late_is_a_loss(totals_and_publisher
     assert (losses.recent, losses.total) == (recent, in_all)
 
 
-def test_a_clock_that_was_set_has_stepped_once_and_is_told_for_half_a_minute():
+_MS = 1_000_000
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(
+    ("step", "has_stepped", "is_told"),
+    [(100 * _MS, False, False), (100 * _MS + 1, True, False), (500 * _MS - 1, True, False), (500 * _MS, True, True)],
+)
+def test_a_clock_that_was_set_has_stepped_once_and_is_told_for_half_a_minute(step, has_stepped, is_told, sign):
     runtime, ahead = SystemRuntime(), [0]
-    runtime.time_ns = lambda: time.monotonic_ns() + ahead[0]
+    runtime.monotonic_ns = lambda: _SECOND
+    runtime.time_ns = lambda: _SECOND + ahead[0]
     clock = SystemClock(runtime=runtime)
     assert not clock.has_stepped(0)
-    for at, step in ((10 * _SECOND, 5 * _SECOND), (20 * _SECOND, -5 * _SECOND)):
-        ahead[0] += step
-        assert [clock.has_stepped(at), clock.has_stepped(at)] == [True, False]
-        told = clock.last_step(at + 29 * _SECOND)
-        assert told is not None
-        assert (told.at, told.by) == (at, pytest.approx(step, abs=_SECOND // 2))
+    for at in (10 * _SECOND, 20 * _SECOND):
+        ahead[0] += sign * step
+        assert [clock.has_stepped(at), clock.has_stepped(at)] == [has_stepped, False]
+        assert (
+            clock.last_step(at)
+            == clock.last_step(at + 30 * _SECOND - 1)
+            == (Step(at, sign * step) if is_told else None)
+        )
         assert clock.last_step(at + 30 * _SECOND) is None
 
 
-def test_simulated_time_stands_still_when_it_did_not_move_for_more_than_two_ticks_at_1_hz():
+def test_simulated_time_stands_still_when_it_did_not_move_for_two_and_a_half_ticks_at_1_hz():
     clock = SimulatedClock()
     now = time.time_ns()
     seen = []
-    for simulated, seconds in ((7, 0), (7, 2), (7, 3), (8, 4)):
-        clock.observe(simulated, now=now + seconds * _SECOND)
+    for simulated, passed in ((7, 0), (7, 2500 * _MS - 1), (7, 2500 * _MS), (8, 4 * _SECOND)):
+        clock.observe(simulated, now=now + passed)
         seen.append(clock.state)
-    assert seen == [ClockState(received=True, stopped=ns) for ns in (None, None, 3 * _SECOND, None)]
+    assert seen == [ClockState(received=True, stopped=ns) for ns in (None, None, 2500 * _MS, None)]
 
 
 def test_a_simulated_clock_that_nobody_tells_was_never_received():
