@@ -37,7 +37,7 @@ ROOMS: Final = {
     "sync": ["tests/sync"],
     "explain": ["tests/explain", "tests/status", "tests/cli/test_tap.py"],
     "dataflow": ["tests/dataflow", "tests/status/test_taps.py", _PLAYED],
-    "relay": [_PLAYED],
+    "relay": [_PLAYED, "tests/ros"],
     "recordings/bag": ["tests/recordings/bag", "tests/recordings/analysis", "tests/recordings/datasets"],
 }
 _LEFT_OUT: Final = "not (ros or browser or peer or process or real_data)"

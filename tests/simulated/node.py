@@ -162,7 +162,7 @@ class SimulatedNode:
         self._offered: dict[str, Call] = {}
         self._due: deque[Callable[[], object]] = deque()
         self._served = runtime.rest()
-        self._ends = self._has_left = self._has_said_below_0 = False
+        self._ends = self._has_said_below_0 = False
         self._time = 0
         self._follower: Callable[[int], None] | None = None
         self._own = [self.node.writer(topic, of, Profile(depth=1000)) for topic, of in _OF_EVERY_NODE.items()]
@@ -311,7 +311,8 @@ class SimulatedNode:
         self._served.set()
 
     def leave(self) -> None:
-        self._has_left = True
+        if self._follower is not None:
+            raise RuntimeError("a node leaves whose clock is still followed")
         self.participant.leave()
 
 
