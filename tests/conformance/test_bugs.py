@@ -1,4 +1,4 @@
-"""A bug in a part of the relay, played on the simulated ROS: others go on, and whoever asks is told."""
+"""A bug in a part of the relay or in a package, on the simulated ROS: others go on, and whoever asks is told."""
 
 from itertools import count
 
@@ -6,13 +6,15 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from sensor_msgs.msg import TimeReference
+
 from syncrelay.config import GroupConfig
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.relay.groups import Groups
 from syncrelay.relay.relay import Relay
 from syncrelay.sync.group import SyncGroup
 from tests.conformance.player import play
-from tests.conformance.script import PAIR, do, group, short
+from tests.conformance.script import PAIR, REFERENCE, do, group, short
 from tests.conformance.seen import Seen
 from tests.conformance.simulated import SimulatedWorld
 
@@ -106,3 +108,16 @@ def test_one_that_ends_the_main_or_the_receive_thread_ends_the_relay_with_all_ot
         with pytest.raises(ZeroDivisionError):
             play(short("a bug", do.relay(PAIR), do.sleep(2), do.call("status")), world, tmp_path)
         assert not [each for each in world.runtime.alive() if each.startswith("syncrelay-") and "files" not in each]
+
+
+def test_one_in_the_library_of_a_type_is_told_as_what_its_topic_lacks(monkeypatch, tmp_path):
+    def failing(*_):
+        raise OSError("libsensor_msgs.so: undefined symbol")
+
+    monkeypatch.setattr(type(TimeReference), "__import_type_support__", failing)
+    time = {"topic": "/time", "type": REFERENCE, "stamp": {"field": "time_ref"}}
+    rear = do.relay({**PAIR, "rear": group("/a", time)})
+    seen = _play(
+        tmp_path, *_SENSORS, rear, do.finding("type_not_importable", "rear"), *_EARS, do.ready(), do.sets(10), *_OUT
+    )
+    assert [each for each in seen.log if "undefined symbol" in each]
