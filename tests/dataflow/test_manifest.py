@@ -32,11 +32,13 @@ def test_others_read_what_was_written(data, name, node, number, latency):
     told = read(payload)
     stamps = [each.original_stamp for each in members if each is not None]
     missing, unpublished = members.count(None), sum(bool(each and each.why_not) for each in members)
-    assert told._replace(inputs=(), message="") == Told(
+    counts = {"missing": missing, "not published": unpublished}
+    faults = ", ".join(f"{count} of {len(members)} {what}" for what, count in counts.items() if count)
+    assert told._replace(inputs=()) == Told(
         stamp=max(stamps) if common is None else common,
         level=ERROR if unpublished else WARN if missing else OK,
         group=name,
-        message="",
+        message=faults or "complete",
         node=f"/{node}",
         number=number,
         missing=missing,
