@@ -259,7 +259,7 @@ _GRAPH: Final = (
         do.counts("one", buffered=0), do.counts("two", buffered=0)),
     short("who listens hears what has a header, once and from the first on",
         do.publisher("/a"), do.publisher("/b", reliability="best_effort"), do.publisher("/text", of=STRING),
-        do.listen(8), do.served("/a", 1), do.served("/b", 1),
+        do.publisher("/diagnostics", of=ARRAY), do.listen(8), do.served("/a", 1), do.served("/b", 1),
         do.write("/a", 10, 20), do.sleep(0.1), do.write("/b", 10), do.sleep(0.3), do.write("/a", 0, data=b"\0\1\0\0"),
         do.publisher("/c"), do.served("/c", 1), do.write("/c", 20), do.heard()),
     short("who listens beside a relay passes over its outputs",
