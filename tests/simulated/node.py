@@ -380,6 +380,8 @@ class SimulatedWatch:
         self._rest = runtime.rest()
         self._time_ns = runtime.time_ns
         self._random = runtime.scheduler.stream("watch").random
+        self._held = runtime.held
+        self._held.add("wait set")
         self._sources: list[SimulatedSource] = []
         self._woken = False
 
@@ -417,7 +419,7 @@ class SimulatedWatch:
         self._rest.set()
 
     def close(self) -> None:
-        """Nothing is held."""
+        self._held.discard("wait set")
 
 
 _PARTLY: Final = 0.3

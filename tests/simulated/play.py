@@ -76,7 +76,7 @@ def _run(world: World, promises: Promises) -> list[str]:
             if not relay.has_ended:
                 promises.broken.append(f"the relay has not ended:\n{scheduler.describe()}")
             if relay.left:
-                promises.broken.append(f"the relay has ended before its threads {relay.left}")
+                promises.broken.append(f"the relay has ended, but not its {relay.left}")
     except StuckError as error:
         promises.broken.append(f"{world.now:.2f} s: {error}")
     except Exception as error:  # noqa: BLE001  what the relay's threads raise

@@ -416,6 +416,8 @@ class SimulatedRuntime:
         self.time_ns = process.time_ns
         self.sleep = scheduler.sleep
         self._threads: dict[str, SimulatedThread] = {}
+        self.held: set[str] = set()
+        """What has to be freed before the process ends."""
         self._used = 0
 
     def monotonic(self) -> float:

@@ -195,7 +195,7 @@ class RelayProcess(Running):
         self.process.clock_offset = world.clock_offset
         self.node: SimulatedNode | None = None
         self.left: list[str] = []
-        """The threads that had not ended when it had. A file that is being read is not waited for."""
+        """What it had not freed when it had ended, and threads that had not. A file that is read is not waited for."""
         self._world, self._simulated = world, SimulatedRuntime(self.process)
         super().__init__(
             path,
@@ -208,7 +208,7 @@ class RelayProcess(Running):
 
     def main(self) -> None:
         super().main()
-        self.left = [name for name in self._simulated.alive() if name != _FILES]
+        self.left = [*(name for name in self._simulated.alive() if name != _FILES), *self._simulated.held]
 
     def _joined(self, config: Config) -> tuple[SimulatedNode, SimulatedBackend]:
         participant = self._world.bus.participant(self.process)
