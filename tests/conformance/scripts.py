@@ -272,8 +272,10 @@ _GRAPH: Final = (
         do.write("/a", 70), do.endpoints("/front/a", publishers=0),
         do.endpoints("/syncrelay/front/sets", publishers=0), do.endpoints("/diagnostics", publishers=0), do.observed()),
     long("a name that nobody publishes, and one that is like it",
-        do.publisher("/camera/image"), do.publisher("/b"), do.relay(_front("/camera/imag", "/b")),
-        do.finding("no_publisher")),
+        do.publisher("/camera/image"), do.publisher("/b"),
+        do.relay({**_front("/camera/imag", "/b"),
+            "rear": group(row("/camera/image", output="/camera/imago"), "/b", manifest=False)}),
+        do.endpoints("/camera/imago", publishers=1), do.finding("no_publisher")),
 )
 
 _MESSAGES: Final = (

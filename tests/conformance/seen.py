@@ -14,8 +14,9 @@ from syncrelay.relay.ports import EndpointInfo
 MS: Final = 1_000_000
 KNOWN: Final = Path(__file__).with_name("seen.txt")
 """What each script shows; `python -m tests.conformance` prints it."""
-# What is said of findings is held by tests/explain/findings.txt.
+# How findings are worded is held by tests/explain/findings.txt; whom they name is held here.
 _CODES: Final = frozenset(code.value for code in Code)
+_NAME: Final = re.compile(r"(?<!\w)/\w[\w/]*")
 _OF_GROUP: Final = ("front: ", "rear: ")
 # In the sources of ROS.
 _PLACE: Final = re.compile(r", at [^ ,]+:\d+")
@@ -56,7 +57,9 @@ def _messages(texts: Sequence[str]) -> str:
 
 def _note(note: Sequence[Any]) -> str:
     first, *rest = note
-    return str(first) if first in _CODES else " ".join([str(first), *(_short(each) for each in rest)])
+    if first in _CODES:
+        return " ".join([first, *sorted({name for words in rest for name in _NAME.findall(words)})])
+    return " ".join([str(first), *(_short(each) for each in rest)])
 
 
 def _short(said: Any) -> str:
