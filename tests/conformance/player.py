@@ -155,8 +155,11 @@ class Player:
 
         def look() -> None:
             runtime, purpose = self._world.runtime, Purpose.OBSERVE
+            began = runtime.monotonic()
             with Relay(config, node, backend, purpose=purpose, runtime=runtime) as relay:
-                self._observed.append(relay.look(seconds))
+                reports = relay.look(seconds)
+            self._note("looked for as long as asked", runtime.monotonic() - began >= seconds)
+            self._observed.append(reports)
 
         self._world.runtime.start("observe", look)
 
