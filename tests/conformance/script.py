@@ -5,6 +5,7 @@ from typing import Any, Final, NamedTuple
 
 VECTOR: Final = "geometry_msgs/msg/Vector3Stamped"
 POINT: Final = "geometry_msgs/msg/PointStamped"
+BOOL: Final = "std_msgs/msg/Bool"
 STRING: Final = "std_msgs/msg/String"
 REFERENCE: Final = "sensor_msgs/msg/TimeReference"
 CLOCK: Final = "rosgraph_msgs/msg/Clock"

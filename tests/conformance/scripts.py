@@ -4,6 +4,7 @@ from typing import Any, Final
 
 from tests.conformance.script import (
     ARRAY,
+    BOOL,
     CLOCK,
     PAIR,
     POINT,
@@ -324,11 +325,11 @@ _MESSAGES: Final = (
         _rig(policy="approximate_time_eager", slop="8ms", restamp="latest"), do.feed("/a", 10), do.feed("/b", 13),
         do.feed("/b", 30), do.feed("/a", 35), _out(2)),
     long("what is to be stamped alike by its receipt, and has no place for a stamp, is malformed",
-        do.publisher("/a"), do.publisher("/b", of=STRING),
-        do.relay(_front(row("/a", stamp="receive"), {"topic": "/b", "type": STRING, "stamp": "receive"},
+        do.publisher("/a"), do.publisher("/b", of=BOOL),
+        do.relay(_front(row("/a", stamp="receive"), {"topic": "/b", "type": BOOL, "stamp": "receive"},
             policy="approximate_time_eager", slop="50s", restamp="latest")),
-        do.subscriber("/front/a"), do.subscriber("/front/b", of=STRING), do.ready(),
-        do.feed("/a", 0, data=b"\0\1\0\0\7\0"), do.feed("/a", 10), do.feed("/b", 0, data=b"\0\1\0\0\2\0\0\0x\0\0\0"),
+        do.subscriber("/front/a"), do.subscriber("/front/b", of=BOOL), do.ready(),
+        do.feed("/a", 0, data=b"\0\1\0\0\7\0"), do.feed("/a", 10), do.feed("/b", 0, data=b"\0\1\0\0\1\0\0\0"),
         _out(1), do.counts(), blind=("outputs",)),
     long("sets are thinned", _rig(max_rate="10 Hz"), do.sets(0, 30, 60, 100, 130, 200), _out(3), do.counts()),
 )
