@@ -108,11 +108,12 @@ class Player:
         *,
         node: Mapping[str, Any] | None = None,
         names: Mapping[str, str] | None = None,
+        **sections: Any,
     ) -> None:
         """The relay starts; `names` are remaps."""
         self._path = self._folder / "fusion.yaml"
         self._node_keys = node or {}
-        self.file(groups)
+        self.file(groups, **sections)
         world = self._world
         self._running = running = _Running(
             self._path, join=lambda config: world.join(config, names or {}), runtime=world.runtime
@@ -191,10 +192,10 @@ class Player:
             level = int.from_bytes(status.level, "little")
             self._note("diagnosed", status.name, level, status.hardware_id, *values)
 
-    def file(self, groups: Mapping[str, Any], *, node: Mapping[str, Any] | None = None) -> None:
+    def file(self, groups: Mapping[str, Any], *, node: Mapping[str, Any] | None = None, **sections: Any) -> None:
         """The relay's file is written."""
         keys = {**self._node_keys, **(node or {})}
-        self.text(json.dumps({"version": 1, "node": keys, "metrics": None, "groups": groups}))
+        self.text(json.dumps({"version": 1, "node": keys, "metrics": None, **sections, "groups": groups}))
 
     def text(self, text: str) -> None:
         """The relay's file holds this."""
