@@ -50,15 +50,19 @@ def test_a_slow_topic_gets_its_turn_in_a_flood():
     assert delivered.index("camera") == 50
 
 
-def test_a_source_that_ends_gives_what_is_held_of_it():
-    delivered: list[str] = []
+@pytest.mark.parametrize("seed", range(10))
+def test_a_source_that_ends_gives_what_is_held_of_it_and_the_others_go_on_in_order(seed):
+    chance = random.Random(seed)
+    delivered: list[int] = []
+    times = chance.sample(range(10, 100), 30)
+    sources = [_source(delivered, (at, at)) for at in times]
     backlog = Backlog()
-    ending, staying = _source(delivered, (6, "a")), _source(delivered, (7, "A"))
-    backlog.deliver([ending, staying], 5)
-    backlog.forget(ending)
-    assert delivered == ["a"]
-    backlog.deliver([], 10)
-    assert delivered == ["a", "A"]
+    backlog.deliver(sources, 5)
+    ending = chance.randrange(len(sources))
+    backlog.forget(sources[ending])
+    assert delivered == [times[ending]]
+    backlog.deliver([], 100)
+    assert delivered[1:] == sorted(set(times) - {times[ending]})
 
 
 def test_messages_up_to_a_time_leave_however_many_they_are():

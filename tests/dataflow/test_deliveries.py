@@ -110,7 +110,10 @@ def test_the_longest_gap_and_the_least_way_are_those_since_the_last_look():
     tally.note(b"b", None, 1000, 2000)
     assert tally.read() == [Deliveries(b"a", 3, 9, 3, 1000, longest_gap=4, least_way=20)]
     assert tally.read() == [Deliveries(b"a", 3, 9, 3, 1000, longest_gap=0, least_way=None)]
-    tally.note(b"a", 9 + LARGEST_GAP + 2, 1000, 1000)
+    newest = 9 + LARGEST_GAP + 1
+    tally.note(b"a", newest, 1000, 1000)
+    assert [(each.sent, each.longest_gap) for each in tally.read()] == [(newest - 2, LARGEST_GAP)]
+    tally.note(b"a", newest + LARGEST_GAP + 2, 1000, 1000)
     assert [each.sent for each in tally.read()] == [1]
 
 
