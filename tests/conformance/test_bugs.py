@@ -11,12 +11,14 @@ from sensor_msgs.msg import TimeReference
 from syncrelay.config import GroupConfig
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.relay.groups import Groups
+from syncrelay.relay.ports import RclError
 from syncrelay.relay.relay import Relay
 from syncrelay.sync.group import SyncGroup
 from tests.conformance.player import play
 from tests.conformance.script import PAIR, REFERENCE, do, group, short
 from tests.conformance.seen import Seen
 from tests.conformance.simulated import SimulatedWorld
+from tests.simulated.node import SimulatedNode
 
 _SENSORS = (do.publisher("/a"), do.publisher("/b"))
 _EARS = (do.subscriber("/front/a"), do.subscriber("/front/b"))
@@ -108,6 +110,21 @@ def test_one_that_ends_the_main_or_the_receive_thread_ends_the_relay_with_all_ot
         with pytest.raises(ZeroDivisionError):
             play(short("a bug", do.relay(PAIR), do.sleep(2), do.call("status")), world, tmp_path)
         assert not [each for each in world.runtime.alive() if each.startswith("syncrelay-") and "files" not in each]
+
+
+def test_what_dds_refuses_is_asked_for_again_though_the_graph_does_not_change(monkeypatch, tmp_path):
+    sound, refused = SimulatedNode.publisher, count()
+
+    def refusing(node, message_type, topic, profile):
+        if topic == "/front/a" and next(refused) < 2:
+            raise RclError("no memory")
+        return sound(node, message_type, topic, profile)
+
+    monkeypatch.setattr(SimulatedNode, "publisher", refusing)
+    steps = (do.relay(PAIR), *_SENSORS, *_EARS, do.finding("refused_by_dds"), do.settled(), do.ready(), do.sets(10))
+    seen = _play(tmp_path, *steps, *_OUT)
+    assert next(refused) == 3
+    assert [each for each in seen.log if "no memory" in each]
 
 
 def test_one_in_the_library_of_a_type_is_told_as_what_its_topic_lacks(monkeypatch, tmp_path):
