@@ -172,7 +172,7 @@ class ShareWindow:
         for place, index in enumerate(self._counted):
             if index not in self._paced and (period := paces[index].period) is not None:
                 self._paced.add(index)
-                self._count_again(place, period)
+                self._count_again(place, period, since=paces[index].first)
         before = self._polls[-1]
         last = max((each.last for each in paces if each.last is not None), default=before.at)
         owed = []
@@ -181,14 +181,16 @@ class ShareWindow:
             if period is None:
                 owed.append(owed_before + came - fed_before)
             else:
-                owed.append(owed_before + max(0, min(now, round(last + _LATE * period)) - before.at) / period)
+                begin = max(before.at, paces[index].first or before.at)
+                owed.append(owed_before + max(0, min(now, round(last + _LATE * period)) - begin) / period)
         return tuple(owed)
 
-    def _count_again(self, place: int, period: float) -> None:
-        """Count what an input owed since the first poll, now that its period is known."""
+    def _count_again(self, place: int, period: float, *, since: int | None) -> None:
+        """Count what an input owed since the first poll, or its first message, now that its period is known."""
         first = self._polls[0]
+        begin = max(first.at, since or first.at)
         for number, poll in enumerate(self._polls):
-            owed = first.owed[place] + (poll.at - first.at) / period
+            owed = first.owed[place] + max(0, poll.at - begin) / period
             self._polls[number] = poll._replace(owed=(*poll.owed[:place], owed, *poll.owed[place + 1 :]))
 
     def _since(self, first: _Poll) -> Share:

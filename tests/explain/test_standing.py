@@ -167,3 +167,11 @@ def test_a_share_is_measured_by_one_clock_alone():
         window.add(counts, second * 4, [Pace(BEGAN, BEGAN + second * S, S // 4)], now=BEGAN + second * S, clock=clock)
         assert window.share().possible <= 4 * second
         assert window.share().ns <= second * S
+
+
+@pytest.mark.parametrize("begin", [0.5, 2.3, 2.7, 2.95])
+def test_sensors_that_begin_after_the_relay_owe_nothing_for_the_time_before(begin):
+    sources = (Source(topic, 80, sends=lambda second: second >= begin) for topic in ("/camera", "/lidar"))
+    told = run(*sources, seconds=12, options={"slop": "10ms"})
+    assert told.ever_found == set()
+    assert told.facts.figures.share.absent == 0
