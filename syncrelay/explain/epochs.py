@@ -38,6 +38,7 @@ _SHOW_A_UNIT: Final = 2
 _BETTER: Final = 0.2
 _LEAST_SCATTER: Final = 20_000_000
 _WATCHED: Final = _SECOND
+_EVENLY: Final = 0.3
 _NEVER_HELD: Final = 30 * _SECOND
 # The delays between these quantiles: a pause or a message that was held up says nothing of a clock.
 _MIDDLE: Final = (0.1, 0.9)
@@ -115,9 +116,10 @@ def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
     last = [(stamp, stamp + delay) for stamp, delay in zip(stamps[newest], delays[newest], strict=True)]
     if len(last) < _SHOW_A_UNIT:
         return None
-    found = _of_rate(last, scatter)
-    if last[-1][1] - last[0][1] < _WATCHED:
-        # Of messages that were held up and come at once, stamps run fast too, but not over as long.
+    found, received = _of_rate(last, scatter), [at for _, at in last]
+    span = received[-1] - received[0]
+    # Of messages that were held up and come at once, stamps run fast too, but not over as long.
+    if span < _WATCHED or median(map(sub, received[1:], received)) * len(received) < _EVENLY * span:
         is_sure = found is not None and found.is_unit and abs(last[-1][0] - last[0][0]) > _NEVER_HELD
         return found if is_sure else None
     return _of_parts(last, scatter) or found

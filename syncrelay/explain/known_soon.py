@@ -3,7 +3,7 @@
 from typing import Final
 
 from syncrelay.explain.codes import Code
-from syncrelay.explain.facts import GroupFacts
+from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.rules_drift import may_drift
 from syncrelay.explain.rules_matching import is_overdue
 
@@ -14,11 +14,23 @@ _OF_STEP: Final = _OF_DRIFT | {Code.SHORT_QUEUE, Code.OUT_OF_ORDER, Code.CLOCK_D
 _OF_PACE: Final = frozenset({Code.OVER_SLOP, Code.SHORT_QUEUE, Code.FEW_SETS, Code.UNEXPLAINED})
 
 
+# So many messages, over so long, show of which unit stamps are, and at which rate they run.
+_FEWEST: Final = 5
+_YOUNG: Final = 1_200_000_000
+
+
+def _is_young(an_input: InputFacts) -> bool:
+    received = an_input.figures.received
+    return bool(received) and (len(received) < _FEWEST or received[-1] - received[0] < _YOUNG)
+
+
 def known_soon(facts: GroupFacts, code: Code) -> str:
     """Say what is to be waited for, where more will be known soon of what brings a finding of this code about."""
     what = ""
     if code in _OF_STEP and facts.by_stamp and any(each.figures.may_step for each in facts.inputs):
         what = "a clock was set"
+    elif code is Code.OTHER_CLOCK and not facts.is_silent and any(_is_young(each) for each in facts.inputs):
+        what = "its stamps are of another unit or rate"
     elif code in _OF_PACE and (slower := next((each for each in facts.inputs if each.figures.may_be_slower), None)):
         what = f"{slower.name} has slowed down"
     elif code in _OF_PACE and not facts.is_silent and (away := is_overdue(facts)) is not None:

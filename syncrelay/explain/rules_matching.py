@@ -77,8 +77,8 @@ def over_slop(facts: GroupFacts) -> Found:
     if facts.has_stopped and over > 1 - _MISSED:
         severity = Severity.ERROR if facts.is_silent else Severity.WARN
         text = _too_wide(facts, tolerance, nearest)
-    # What was held up may only seem far apart, and a wider slop would pair what came together. One message is chance.
-    elif not facts.has_stopped and over > max(_MOST if came_at_once else _MISSED, 1.5 / len(nearest)):
+    # What was held up may only seem far apart, and a wider slop would pair what came together. Two messages are chance.
+    elif not facts.has_stopped and over > max(_MOST if came_at_once else _MISSED, 2.5 / len(nearest)):
         text, severity = _often_too_wide(facts, tolerance, nearest), Severity.WARN
     else:
         return

@@ -324,7 +324,7 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "enough to tell": (0, 9, 3, lambda n: told(wide(*[60 * MS] * n), Code.OVER_SLOP)),
     "all over slop": (0, 100, 96, lambda n: told(wide(*[60 * MS] * n, *[MS] * (100 - n)), Code.OVER_SLOP)),
     "some over slop": (0, 100, 6, lambda n: told(a_group(figures=spans(n, 100)), Code.OVER_SLOP)),
-    "more than chance": (0, 20, 2, lambda n: told(a_group(figures=spans(n, 20)), Code.OVER_SLOP)),
+    "more than chance": (0, 20, 3, lambda n: told(a_group(figures=spans(n, 20)), Code.OVER_SLOP)),
     "most over slop": (0, 100, 51, lambda n: told(a_group(BURSTING, LIDAR, figures=spans(n, 100)), Code.OVER_SLOP)),
     "a queue too short": (0, 99, 11, lambda n: told(a_silent_group(overflowing(n), LIDAR), Code.SHORT_QUEUE)),
     "missed for a queue": (1000, 0, 949, lambda hz: told(overflows(hz / 100), Code.SHORT_QUEUE)),

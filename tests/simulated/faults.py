@@ -191,7 +191,9 @@ def twice(world: World, target: str, _: float) -> End:
     return _set(world, target, is_twice=True)
 
 
-@_kind("sensor", names="over_slop constant_offset few_sets silent slowed clock_drift out_of_order short_queue")
+@_kind(
+    "sensor", names="over_slop constant_offset clock_step few_sets silent slowed clock_drift out_of_order short_queue"
+)
 def stamps_early(world: World, target: str, _: float) -> End:
     """Stamps are too early, by more than sets may span."""
     return _set(world, target, shift=-80 * MS)
