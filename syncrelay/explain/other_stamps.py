@@ -68,9 +68,16 @@ def wandering(trials: Trials, index: int) -> int:
     mapped = None if tolerance is None else _mapped(trials, index)
     if tolerance is None or mapped is None or not messages.are_stamped.any():
         return 0
-    behind = shifted(mapped[messages.are_stamped] - messages.stamps[messages.are_stamped], 0)
-    wandered = quantile(behind, 0.95) - quantile(behind, 0.05)
-    return wandered if wandered >= max(_LEAST_DISTANCE, _MATTERS * tolerance.ns) else 0
+    is_set = messages.are_stamped
+    wandered = _spread(mapped[is_set] - messages.stamps[is_set])
+    # What wanders by less than messages are late by may have come of that.
+    jitter = _spread(messages.received[is_set] - mapped[is_set])
+    return wandered if wandered >= max(_LEAST_DISTANCE, _MATTERS * tolerance.ns, jitter) else 0
+
+
+def _spread(values: Nanoseconds) -> int:
+    near = shifted(values, 0)
+    return quantile(near, 0.95) - quantile(near, 0.05)
 
 
 def _can_be_followed(figures: InputFigures) -> bool:
