@@ -100,6 +100,7 @@ class InputObservation:
         # Of two clocks in turn, each fall is followed by a rise: nothing begins anew.
         if fallen and not self._steps.swings(last)[0]:
             self._forget()
+            self._steps.forget_clock()
         while self._faults and self._faults[0].at <= last - WINDOW_NS:
             self._faults.popleft()
         self._faults.append(_Faults(last, duplicates, out_of_order))
@@ -197,6 +198,7 @@ class InputObservation:
             held_up=[(each.at - each.held, each.at) for each in bursts],
             fell_by=fell_by,
             fell_at=fell_at,
+            least_delay=self._steps.least,
             stepped=self._steps.last,
             may_step=self._steps.may_step,
             swings=swings,

@@ -12,6 +12,7 @@ from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.epochs import BOOT_NS, time_scale
 from syncrelay.explain.facts import GroupFacts, InputFacts
+from syncrelay.explain.figures import InputFigures
 from syncrelay.explain.findings import SECOND, Fault, Found, blocks, counted, nodes
 from syncrelay.explain.other_stamps import offered_stamps
 from syncrelay.explain.rules_flow import waited_for_relay
@@ -97,7 +98,7 @@ def other_clock(facts: GroupFacts) -> Found:
         return
     # Two messages show whether their stamps run as time does.
     delays = {
-        index: Distribution(each.figures.delays).quantile(_LEAST_DELAY)
+        index: _least_delay(each.figures)
         for index, each in enumerate(facts.inputs)
         if each.required and (each.figures.rate_hz or len(each.figures.received) == 1) and len(each.figures.delays) > 1
     }
@@ -130,6 +131,12 @@ def other_clock(facts: GroupFacts) -> Found:
             f"{_wait_for_it(facts, odd, behind)}"
         )
     yield Fault(text, suggestion, blocks(facts, an_input), input=odd)
+
+
+def _least_delay(figures: InputFigures) -> int:
+    """Return how late the quickest messages are: of the last, or if all of these are late, of those of the minute."""
+    usual = Distribution(figures.delays).quantile(_LEAST_DELAY)
+    return usual if figures.least_delay is None else min(usual, figures.least_delay)
 
 
 def _misread(facts: GroupFacts) -> Found:

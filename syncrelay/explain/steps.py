@@ -26,6 +26,7 @@ _COMES_BACK: Final = 5 * _SECOND
 _ALIKE: Final = 0.25
 # Levels are those of so many looks, and known from so few: those of less lie in a wider range, by this many to as many.
 _LEVELS: Final = 40
+_REMEMBERED: Final = 60
 _FEWEST: Final = 3
 _KNOWN_OF: Final = 12
 # Another level is as far beyond the range of the levels as that is wide, and by this.
@@ -58,14 +59,25 @@ class StampSteps:
         self._change = _Change(0, 0)
         self._swung: Step | None = None
         self._swings: deque[Step] = deque(maxlen=100)
+        self._least: deque[int] = deque(maxlen=_REMEMBERED)
         self.last: Step | None = None
         """The last step that stayed."""
+
+    @property
+    def least(self) -> int | None:
+        """The least delay of the last minute, be they all late now; None of a clock that was just set."""
+        return min(self._least, default=None)
+
+    def forget_clock(self) -> None:
+        """Bear that stamps are of another clock from now on."""
+        self._least.clear()
 
     def forget(self) -> None:
         """Start afresh: this machine's clock was set."""
         self._before = (), ()
         self._swung = self.last = None
         self._swings.clear()
+        self.forget_clock()
         self.forget_levels()
 
     def forget_levels(self) -> None:
@@ -92,6 +104,7 @@ class StampSteps:
         if max(most, newest) - min(least, newest) >= STEP_NS:
             self._count_swings(_following(before, received, delays)[-len(delays) - 1 :], period())
         levels = self._levels
+        self._least.append(least)
         if len(levels) < _FEWEST:
             levels.append(least)
             return None
@@ -132,6 +145,7 @@ class StampSteps:
             self._off.clear()
             return None
         self._levels = deque(self._off, _LEVELS)
+        self._least = deque(self._off, _REMEMBERED)
         self._off.clear()
         if min(abs(level), abs(before)) < _LIVE and abs(by) < _DAY:
             self.last = Step(self._change.at, by)
