@@ -342,9 +342,10 @@ def _wrong_with(draw: Drawn, text: str) -> str | None:
 
 def sets_of(draw: Drawn, config: GroupConfig, since: float = 0.0, until: float = LONGEST_S) -> Iterator[int]:
     """Give the true span of each set of samples taken since then, of the messages that come until then."""
+    index_of = {topic.topic: index for index, topic in enumerate(config.topics)}
     came = [
-        (int(at), index, int(stamp), int(true))
-        for index, each in enumerate(draw.rig.flows)
+        (int(at), index_of[each.topic], int(stamp), int(true))
+        for each in draw.rig.flows
         for at, stamp, true in zip(each.received, each.stamps, each.true, strict=True)
         if at <= until * S
     ]

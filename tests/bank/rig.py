@@ -103,6 +103,8 @@ def spans(
 ) -> Times:
     """The span of the nearest set of each message of the slowest input, by stamps; of those that are whole."""
     flows = flows or rig.flows
+    if not all(len(by(each)) for each in flows):
+        return np.zeros(0, dtype=np.int64)
     pivot = max(flows, key=lambda each: each.period)
     stamps = by(pivot)
     low, high = stamps.copy(), stamps.copy()
