@@ -172,13 +172,16 @@ class InputObservation:
         rate_hz, usual_hz = self._rates(fed, seconds, now)
         faulty = [each for each in self._faults if each.at > now - WINDOW_NS and (each.duplicates or each.out_of_order)]
         swings, swung_by = self._steps.swings(now)
+        # Of what comes no more, nothing will be known soon.
+        goes_on = not self._is_silent_at(now)
+        may_step = self._steps.may_step and goes_on
         bursts = [each for each in self._bursts if each.at > now - WINDOW_NS]
         return InputFigures(
             rate_hz=rate_hz,
             usual_hz=usual_hz,
             pace_hz=self._pace.now_hz,
             slowed_from_hz=self._pace.slowed_from if rate_hz else None,
-            may_be_slower=self._pace.may_be_slower,
+            may_be_slower=self._pace.may_be_slower and goes_on,
             fed=fed,
             dropped=dropped,
             flows_since=self._flows_since,
@@ -187,7 +190,7 @@ class InputObservation:
             delays=self._delays[-_LAST_MESSAGES:],
             drift=self._drift,
             # Across a step they seem to run at any rate.
-            reading=None if self._steps.may_step else reading(self._stamps, self._delays),
+            reading=None if may_step else reading(self._stamps, self._delays),
             resolution=resolution(self._stamps),
             duplicates=sum(each.duplicates for each in faulty),
             out_of_order=sum(each.out_of_order for each in faulty),
@@ -200,7 +203,7 @@ class InputObservation:
             fell_at=fell_at,
             least_delay=self._steps.least,
             stepped=self._steps.last,
-            may_step=self._steps.may_step,
+            may_step=may_step,
             swings=swings,
             swung_by=swung_by,
         )

@@ -12,8 +12,6 @@ _OF_DRIFT: Final = frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET, Code.FEW_SET
 _OF_STEP: Final = _OF_DRIFT | {Code.SHORT_QUEUE, Code.OUT_OF_ORDER, Code.CLOCK_DRIFT, Code.OTHER_CLOCK}
 # What an input brings about that has slowed down or ceased to come.
 _OF_PACE: Final = frozenset({Code.OVER_SLOP, Code.SHORT_QUEUE, Code.FEW_SETS, Code.UNEXPLAINED})
-
-
 # So many messages, over so long, show of which unit stamps are, and at which rate they run.
 _FEWEST: Final = 5
 _YOUNG: Final = 1_200_000_000

@@ -209,3 +209,14 @@ def test_figures_are_those_of_the_looks_of_the_last_ten_seconds(looks):
         whole = [has for _, _, _, sets, _ in history for has in sets]
         assert group.sets_since_without[1] == next((n for n, has in enumerate(whole[::-1]) if not has), len(whole))
         assert (group.last_set, group.resumed, group.sets) == (last_set, resumed, len(whole))
+
+
+def test_of_an_input_that_ended_nothing_is_awaited():
+    observation = InputObservation()
+    for second in range(20):
+        observation.add([(BEGAN + second * S + n * S // 10, BEGAN + second * S + n * S // 10) for n in range(10)])
+    observation.add([(BEGAN + 20 * S, BEGAN + 20 * S + 300 * MS)])
+    awaited = [
+        observation.figures(fed=10, dropped={}, seconds=10, now=BEGAN + after * S).may_step for after in (21, 40)
+    ]
+    assert awaited == [True, False]
