@@ -46,7 +46,7 @@ class InputFigures:
     delays: Sequence[int] = ()
     """Their times of receipt minus their stamps, without stamps of 0."""
     least_delay: int | None = None
-    """The least of the last minute. None where its clock was just set."""
+    """The least of the look at which it was nearest to none, in the last minute. None where its clock was just set."""
     drift: Drift | None = None
     """How its stamps drift against the times of receipt."""
     reading: Reading | None = None

@@ -136,7 +136,7 @@ def other_clock(facts: GroupFacts) -> Found:
 def _least_delay(figures: InputFigures) -> int:
     """Return how late the quickest messages are: of the last, or if all of these are late, of those of the minute."""
     usual = Distribution(figures.delays).quantile(_LEAST_DELAY)
-    return usual if figures.least_delay is None else min(usual, figures.least_delay)
+    return usual if figures.least_delay is None else min(usual, figures.least_delay, key=abs)
 
 
 def _misread(facts: GroupFacts) -> Found:

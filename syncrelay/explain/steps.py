@@ -65,8 +65,8 @@ class StampSteps:
 
     @property
     def least(self) -> int | None:
-        """The least delay of the last minute, be they all late now; None of a clock that was just set."""
-        return min(self._least, default=None)
+        """The least delay of the look at which it was nearest to none, in the last minute; None of a clock just set."""
+        return min(self._least, key=abs, default=None)
 
     def forget_clock(self) -> None:
         """Bear that stamps are of another clock from now on."""
