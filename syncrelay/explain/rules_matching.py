@@ -90,8 +90,8 @@ def over_slop(facts: GroupFacts) -> Found:
     if 0 < len(coarse) < len(facts.inputs):
         text += "".join(f"; stamps of {name} are multiples of {words.duration(unit)}" for name, unit in coarse.items())
         check = f"check whether {all_of(coarse)} rounds its stamps"
-    odd = _odd_one(facts) if tolerance.key in text else None
-    if odd is not None and facts.inputs[odd].name not in text:
+    odd = _odd_one(facts) if facts.distance is Distance.SPAN else None
+    if odd is not None:
         text += f"; it is {facts.inputs[odd].name} that is off, the others are near each other"
     yield Fault(text, _advice(facts, found) or check, severity)
 

@@ -26,9 +26,10 @@ _COMES_BACK: Final = 5 * _SECOND
 _ALIKE: Final = 0.25
 # Levels are those of so many looks, and known from so few: those of less lie in a wider range, by this many to as many.
 _LEVELS: Final = 40
-_REMEMBERED: Final = 60
 _FEWEST: Final = 3
 _KNOWN_OF: Final = 12
+# A minute of looks: messages that are late now may have been in time.
+_REMEMBERED: Final = 60
 # Another level is as far beyond the range of the levels as that is wide, and by this.
 _LEAST: Final = 2_000_000
 # It is one if so many looks agree; what so many do not agree on is no level.
