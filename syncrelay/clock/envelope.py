@@ -1,16 +1,14 @@
 """The line under the delays of messages: what a clock does, below what the way to us adds.
 
-A delay is the least that there is plus a jitter that is hardly ever negative. So no point lies under the true line but
-a few whose stamp was late, and what is nearest to it tells most (Olson, "A Passive Solution to the Sensor
-Synchronization Problem", 2010). Of all lines with no other point below, this takes the likeliest for jitter that is
-distributed exponentially and for a rate near the one that is expected: an edge of the lower convex hull, or a line of
-the expected rate that touches it.
+Of all lines that touch the lower hull of the delays, this takes the likeliest for a rate near the one that is expected:
+an edge of the hull, or a line of the expected rate.
 """
 
-from bisect import bisect_left
 from collections import deque
 from math import sqrt
 from typing import Final
+
+from syncrelay.clock.hull import OUTLIERS, Hull, Point
 
 # A point stands for so many seconds, and the lowest of them is kept; where these are too many, the oldest are joined.
 _WIDTH: Final = 0.25
@@ -23,11 +21,6 @@ _SHARE_OF_JITTER: Final = 0.05
 _LEAST_MOVED: Final = 1e-4
 LEAST_JITTER: Final = 2e-5
 """What takes less is below what systems tell of times."""
-# Stamps may be late, too. A point says nothing of the line if it lies farther below the next one than so many times
-# what the next ones are apart, which are so many; of all points, at most so many do.
-_ALONE: Final = 4.0
-_NEAR: Final = 30
-_OUTLIERS: Final = 0.05
 # Oscillators are mostly within so much of true time. One that was watched for so long keeps its rate within so much.
 _USUAL_RATE: Final = 100e-6
 _KNOWN_AFTER: Final = 20.0
@@ -51,7 +44,7 @@ class Envelope:
         self.bounds = (-MOST_RATE, MOST_RATE)
         """Between which rates the true one is likely to be."""
         self._expected, self._scale = rate, scale
-        self._points: deque[tuple[float, float, int]] = deque()
+        self._points: deque[Point] = deque()
         self._lowest = (0.0, 0.0)
         self._count = 0
         self._until = _WIDTH
@@ -74,7 +67,7 @@ class Envelope:
             self._count, self._until = 0, x + _WIDTH
             self._fit(x, max(jitter, LEAST_JITTER))
         # Of so few points none is taken for an outlier: the line falls at once, as it does in the first seconds.
-        if len(self._points) * _OUTLIERS < 1:
+        if len(self._points) * OUTLIERS < 1:
             self.level += min(0.0, self.height(x, y))
         self._count += 1
         if self._count == 1 or y - self.rate * x < self._lowest[1] - self.rate * self._lowest[0]:
@@ -90,23 +83,13 @@ class Envelope:
         if not points:
             # The device was away for so long that its clock is known by its rate alone.
             return
-        heights = sorted([y - self.rate * x for x, y, _ in points])
-        first = _first_of_many(heights)
-        hull: list[tuple[float, float]] = []
-        count, total = 0, 0.0
-        for x, y, n in points:
-            count, total = count + n, total + n * x
-            if y - self.rate * x < heights[first]:
-                continue
-            while len(hull) > 1 and _is_above(hull[-1], hull[-2], (x, y)):
-                hull.pop()
-            hull.append((x, y))
+        hull = Hull(points, self.rate)
         # The likeliest line touches the hull under the mean of all points; for a rate that is less expected, so many
         # seconds farther on either side. In between, the expected rate is as good as any.
-        mean, doubt = total / count, jitter / (self._scale * count)
-        self.bounds = _slope(hull, mean - doubt, -MOST_RATE), _slope(hull, mean + doubt, MOST_RATE)
-        self.rate = rate = min(max(self._expected, self.bounds[0]), self.bounds[1])
-        self.level = min([y - rate * x for x, y in hull])
+        doubt = jitter / (self._scale * hull.count)
+        self.bounds = _kept(hull.slope(hull.mean - doubt, -MOST_RATE)), _kept(hull.slope(hull.mean + doubt, MOST_RATE))
+        self.rate = min(max(self._expected, self.bounds[0]), self.bounds[1])
+        self.level = hull.level(self.rate)
 
     def _join_oldest(self) -> None:
         points, half = list(self._points), _MOST // 2
@@ -117,31 +100,6 @@ class Envelope:
         self._points = deque(joined + points[half:])
 
 
-def _first_of_many(heights: list[float]) -> int:
-    """Return which of these heights, sorted, is the least that others are near: less had a stamp that was late."""
-    first = 0
-    for place in range(int(_OUTLIERS * len(heights))):
-        if heights[place + 1] - heights[place] > _ALONE * _spacing(heights, place + 1):
-            first = place + 1
-    return first
-
-
-def _spacing(heights: list[float], first: int) -> float:
-    """Return how far apart the least heights are, from one of them on."""
-    last = min(first + _NEAR, len(heights) - 1)
-    return (heights[last] - heights[first]) / (last - first) if last > first else 0.0
-
-
-def _is_above(point: tuple[float, float], before: tuple[float, float], after: tuple[float, float]) -> bool:
-    """Whether a point lies above, or on, the line between two others."""
-    (x, y), (x1, y1), (x2, y2) = point, before, after
-    return (y - y1) * (x2 - x1) >= (y2 - y1) * (x - x1)
-
-
-def _slope(hull: list[tuple[float, float]], x: float, beyond: float) -> float:
-    """Return a hull's slope at x, within what an oscillator can have; on its ends, `beyond`."""
-    place = bisect_left(hull, (x,))
-    if not 0 < place < len(hull):
-        return beyond
-    (x1, y1), (x2, y2) = hull[place - 1], hull[place]
-    return min(max((y2 - y1) / (x2 - x1), -MOST_RATE), MOST_RATE)
+def _kept(rate: float) -> float:
+    """Keep a rate within what an oscillator can have."""
+    return min(max(rate, -MOST_RATE), MOST_RATE)

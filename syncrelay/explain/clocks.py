@@ -1,34 +1,41 @@
-"""What stamps tell of a clock: how fast it runs against the time of receipt."""
+"""How fast a clock runs against the time of receipt, by the line under its delays."""
 
 from collections.abc import Sequence
-from math import hypot, sqrt
-from operator import mul, sub
-from statistics import fmean, median
-from typing import NamedTuple
+from math import hypot
+from statistics import median
+from typing import Final, NamedTuple
 
-_FEWEST = 5
-_PARTS = 4
-# A slope from few points may be off by more than its standard error says.
-_MORE_OF_FEW = 8
-# A point this many times as far off the line as the median point was held up on its way.
-_HELD_UP = 6
-_LEAST_HELD_UP = 1_000_000
+from syncrelay.clock.hull import Hull, Point
+
+_SECOND: Final = 1_000_000_000
+_FEWEST: Final = 5
+_PARTS: Final = 4
+# So many points tell as much as more, of which they are the least, and are not misled by noise to both sides.
+_JOINED: Final = 20
+# A point this many times as far above the line as the median point was held up on its way.
+_HELD_UP: Final = 6
+_LEAST_HELD_UP: Final = 0.001
+# A slope may be any that is not e^3 times less likely than the likeliest, and is none that is e^16 times less likely:
+# it is looked at every second, of each input of each relay.
+_MAY_BE: Final = 3.0
+_EVIDENT: Final = 16.0
+# What takes less is below what systems tell of times.
+_LEAST_JITTER: Final = 1e-9
 
 
 class Drift(NamedTuple):
     """A slope without unit, positive where stamps run slow, and for how long it was watched in nanoseconds.
 
-    `bend_ns` is how far the delays strayed from the line, by the medians of the quarters of that time: a clock drifts
-    along a line, what else makes delays grow, such as a load, a step or a pause, does not. `error` is that of the
-    slope, by how far single points are off the line: that of jitter is as great as its slope. `points` is how many
-    there were: a few of them lie on some line by chance.
+    `bend_ns` is how far the delays stray from the line, by the medians of the quarters of that time: a clock drifts
+    along a line, what else makes delays grow, such as a load, a step or a pause, does not. The slope is likely within
+    `error`, and for certain within `doubt`.
     """
 
     slope: float
     bend_ns: float
     watched_ns: int
     error: float = 0.0
-    points: int = 60
+    doubt: float = 0.0
 
     @property
     def drifted_ns(self) -> float:
@@ -37,48 +44,58 @@ class Drift(NamedTuple):
 
 
 def drift(points: Sequence[tuple[int, int]]) -> Drift | None:
-    """Return the drift from times of receipt and delays (time of receipt minus stamp), both in nanoseconds.
+    """Return the drift from times of receipt and least delays (times of receipt minus stamps), both in nanoseconds.
 
-    By least squares, without what was held up; None from too few points to tell.
+    Without what was held up; None from too few points to tell.
     """
-    if len(points) < _FEWEST:
+    if len(points) < _FEWEST or points[0][0] == points[-1][0]:
         return None
-    fit = _fit(points)
-    if fit is None:
-        return None
-    found, strayed = fit
-    if max(strayed) < _LEAST_HELD_UP:
-        return found
-    far = _HELD_UP * median(map(abs, strayed))
-    if max(strayed) > far:
-        near = [point for point, off in zip(points, strayed, strict=True) if abs(off) <= far]
-        if len(near) >= _FEWEST and (fit := _fit(near)) is not None:
-            return fit[0]
-    return found
-
-
-def _fit(points: Sequence[tuple[int, int]]) -> tuple[Drift, Sequence[float]] | None:
-    """Return the line through points, and how far each is off it; None where all are of one moment."""
     # As differences of integers, before floats could lose the nanoseconds of an epoch.
     first_time, first_delay = points[0]
-    times = [float(time - first_time) for time, _ in points]
-    delays = [float(delay - first_delay) for _, delay in points]
-    mean_time, mean_delay = fmean(times), fmean(delays)
-    times = [time - mean_time for time in times]
-    spread = sum(map(mul, times, times))
-    if spread == 0:
-        return None
-    slope = sum(map(mul, times, delays)) / spread
-    strayed = list(map(sub, delays, [mean_delay + slope * time for time in times]))
-    quarter = len(points) // _PARTS
-    bend = max(abs(median(strayed[part * quarter : (part + 1) * quarter])) for part in range(_PARTS))
-    variance = sum(map(mul, strayed, strayed)) / (len(points) - 2)
-    error = (1 + _MORE_OF_FEW / len(points)) * sqrt(variance / spread)
-    return Drift(slope, bend, points[-1][0] - first_time, error, len(points)), strayed
+    near = [((time - first_time) / _SECOND, (delay - first_delay) / _SECOND, 1) for time, delay in points]
+    slope, heights = _line(near, 0.0)
+    far = max(_HELD_UP * median(heights), _LEAST_HELD_UP)
+    if max(heights) > far:
+        near = [point for point, height in zip(near, heights, strict=True) if height <= far]
+        if len(near) < _FEWEST:
+            return None
+    hull = Hull(_joined(near, slope), slope)
+    slope = hull.slope(hull.mean, slope)
+    quarter = len(near) // _PARTS
+    parts = [near[part * quarter : (part + 1) * quarter] for part in range(_PARTS)]
+    medians = [median([y - slope * x for x, y, _ in part]) for part in parts]
+    bend = (max(medians) - min(medians)) / 2 * _SECOND
+    error, doubt = (_half(hull.bounds(slope, evidence, _LEAST_JITTER)) for evidence in (_MAY_BE, _EVIDENT))
+    return Drift(slope, bend, points[-1][0] - first_time, error, doubt)
+
+
+def _joined(points: Sequence[Point], slope: float) -> Sequence[Point]:
+    """Return of each few points the one that is nearest to a line below."""
+    of = -(-len(points) // _JOINED)
+    if of == 1:
+        return points
+    parts = [points[first : first + of] for first in range(0, len(points), of)]
+    return [min(part, key=lambda point: point[1] - slope * point[0]) for part in parts]
+
+
+def _line(points: Sequence[Point], rate: float) -> tuple[float, list[float]]:
+    """Return the slope of the likeliest line under points, and how far above it each of them is."""
+    hull = Hull(points, rate)
+    slope = hull.slope(hull.mean, rate)
+    level = hull.level(slope)
+    return slope, [y - slope * x - level for x, y, _ in points]
+
+
+def _half(bounds: tuple[float, float]) -> float:
+    return (bounds[1] - bounds[0]) / 2
 
 
 def apart(one: Drift, other: Drift) -> Drift:
     """Return how fast two inputs drift apart."""
-    watched = min(one.watched_ns, other.watched_ns)
-    error, points = hypot(one.error, other.error), min(one.points, other.points)
-    return Drift(one.slope - other.slope, one.bend_ns + other.bend_ns, watched, error, points)
+    return Drift(
+        one.slope - other.slope,
+        one.bend_ns + other.bend_ns,
+        min(one.watched_ns, other.watched_ns),
+        hypot(one.error, other.error),
+        hypot(one.doubt, other.doubt),
+    )

@@ -28,8 +28,7 @@ _ROOM: Final = 0.8
 # What wanders by less is not why sets are missing: a share of the tolerance, and what drivers take.
 _MATTERS: Final = 0.5
 _LEAST_DISTANCE: Final = 1_000_000
-# A drift is too great to be followed if it is by so many standard errors, and goes along a line.
-_EVIDENT: Final = 5
+# A drift is too great to be followed if it is that for certain, and goes along a line.
 _BENDS: Final = 8
 
 
@@ -86,7 +85,7 @@ def _can_be_followed(figures: InputFigures) -> bool:
         return False
     drift = figures.drift
     is_line = drift is not None and abs(drift.drifted_ns) >= _BENDS * drift.bend_ns
-    return not is_line or drift is None or abs(drift.slope) <= max(MOST_RATE, _EVIDENT * drift.error)
+    return not is_line or drift is None or abs(drift.slope) <= max(MOST_RATE, drift.doubt)
 
 
 def _tried(trials: Trials, index: int, target: int | None, keys: Collection[str]) -> Tried | None:

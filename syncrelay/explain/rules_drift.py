@@ -18,11 +18,6 @@ _DRIFT_WATCHED: Final = 8 * SECOND
 _DRIFT_BENDS: Final = 8
 # Of what came for less than this, no drift is known.
 _YOUNG: Final = 4 * SECOND
-# Call a slope significant at this many standard errors; within _MAY_BE, treat it as zero.
-_EVIDENT: Final = 5
-# Student's distribution: from few points, the same certainty takes far more standard errors.
-_EVIDENT_OF_FEW: Final = 240
-_MAY_BE: Final = 2
 _USUAL: Final = 0.95
 # Wait this long for proof of a drift; the second time only, from when sets are missing, unless stamps look like one.
 _DRIFT_PROVEN: Final = 60 * SECOND
@@ -68,8 +63,7 @@ def may_drift(facts: GroupFacts) -> bool:
     needed = max(_MATTERS * tolerance.ns, nearest.quantile(_USUAL) - tolerance.ns) / watched
     is_urgent = (facts.silent_for if facts.is_silent else watched) >= _DRIFT_PROVEN_SILENT
     return any(
-        abs(each.slope) >= max(needed, _MAY_BE * each.error)
-        or (not is_urgent and abs(each.slope) + _MAY_BE * each.error >= needed)
+        abs(each.slope) >= max(needed, each.error) or (not is_urgent and abs(each.slope) + each.error >= needed)
         for each in _drifts(facts)[1].values()
     )
 
@@ -89,8 +83,7 @@ def clock_drift(facts: GroupFacts) -> Found:
     drifted = abs(found.drifted_ns)
     if found.watched_ns < _DRIFT_WATCHED or drifted < max(_DRIFTED, _DRIFT_BENDS * found.bend_ns):
         return
-    evident = _EVIDENT * (1 + _EVIDENT_OF_FEW / (found.points - 2) ** 3)
-    if not evident * found.error <= abs(found.slope) <= OTHER_RATE:
+    if not found.doubt <= abs(found.slope) <= OTHER_RATE:
         return
     others = [index for index in known if index != odd]
     is_evident = len(others) > 1 or abs(known[others[0]].slope) < _EVIDENTLY * abs(known[odd].slope)

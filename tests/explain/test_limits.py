@@ -154,9 +154,8 @@ def stepped(by: int) -> Any:
     return a_group(*inputs)
 
 
-def drifts(slope: float, watched: int, *, bend: float = 0.0, points: int = 0) -> Any:
-    error = slope / 5 * 0.9 if points else 0.0
-    drift = Drift(slope, bend, watched, error, points or 60)
+def drifts(slope: float, watched: int, *, bend: float = 0.0, doubt: float = 0.0) -> Any:
+    drift = Drift(slope, bend, watched, doubt=doubt)
     return a_group(camera(figures={"drift": drift}), STEADY)
 
 
@@ -317,7 +316,7 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "drifts for 8 s": (0, 60 * S, 8 * S, lambda by: told(drifts(0.001, by), Code.CLOCK_DRIFT)),
     "drifts as oscillators do": (9000, 1000, 2250, lambda ppm: told(drifts(ppm * 1e-6, 60 * S), Code.CLOCK_DRIFT)),
     "drifts along a line": (9 * MS, 0, 750_000, lambda by: told(drifts(0.000_1, 60 * S, bend=by), Code.CLOCK_DRIFT)),
-    "drifts by many points": (4, 60, 15, lambda n: told(drifts(0.000_1, 60 * S, points=n), Code.CLOCK_DRIFT)),
+    "drifts for certain": (120, 0, 100, lambda ppm: told(drifts(1e-4, 60 * S, doubt=ppm * 1e-6), Code.CLOCK_DRIFT)),
     "fell in the input": (0, 9 * S, S + 1, fell_by),
     # How stamps match.
     "over slop": (0, 60 * MS, 20 * MS + 1, lambda by: told(wide(*[by] * 9), Code.OVER_SLOP)),

@@ -104,12 +104,12 @@ def _quantile(values: Nanoseconds, share: float) -> int:
 
 
 def _drift_ppm(stamps: Nanoseconds, received: Nanoseconds) -> float | None:
-    """Return the drift, by the usual delay of each of some hundred stretches; None where it is lost in noise."""
+    """Return the drift, by the least delay of each of some hundred stretches; None where it is lost in noise."""
     if len(stamps) < _DRIFT_POINTS // 10:
         return None
     parts = np.array_split(np.arange(len(stamps)), min(_DRIFT_POINTS, len(stamps) // 3))
     delays = received - stamps
-    points = [(int(received[part[len(part) // 2]]), int(np.median(delays[part] - delays[0]))) for part in parts]
+    points = [(int(received[part[len(part) // 2]]), int(np.min(delays[part] - delays[0]))) for part in parts]
     found = drift(points)
     if found is None or found.watched_ns < _DRIFT_WATCHED or abs(found.drifted_ns) < _DRIFT_BENDS * found.bend_ns:
         return None
