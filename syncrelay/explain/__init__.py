@@ -7,6 +7,7 @@ from syncrelay.clock import Step
 from syncrelay.config import Tolerance
 from syncrelay.config.profile import Mismatch
 from syncrelay.explain.cause_log import CauseLog
+from syncrelay.explain.causes import Trouble, listed, troubles
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import BOUNDS_NS, Distribution, Histogram
 from syncrelay.explain.dry_run import UNREADABLE, EngineDriver
@@ -82,12 +83,15 @@ __all__ = [
     "Step",
     "Tape",
     "Tolerance",
+    "Trouble",
     "TryBudget",
     "drop_fates",
     "explanation",
     "in_words",
     "judge",
+    "listed",
     "may_set_pace",
     "no_other_node",
+    "troubles",
     "with_ok",
 ]

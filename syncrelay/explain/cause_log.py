@@ -1,12 +1,10 @@
 """One log line for each cause, however many groups it affects: it names the node and counts the groups."""
 
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from syncrelay.config.wording import all_of, counted
-from syncrelay.explain import words
-from syncrelay.explain.codes import OF_PUBLISHER, OF_RELAY, Code, Severity
+from syncrelay.explain.causes import Cause, Found, named, sentence, topics_by_cause, worst_first
+from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.findings import Finding
@@ -24,7 +22,6 @@ _EARLY: Final = _SECOND
 _FORGOTTEN: Final = 60 * _SECOND
 # With these codes, every group that uses the topic is affected, even one that was not yet found to be.
 _GIVES_NOTHING: Final = frozenset({Code.SILENT, Code.NO_PUBLISHER})
-_NAMED: Final = 3
 
 
 class Line(NamedTuple):
@@ -34,23 +31,6 @@ class Line(NamedTuple):
     text: str
     groups: tuple[str, ...]
     code: Code | None
-
-
-class _Cause(NamedTuple):
-    """A code and what it belongs to: a node, a group, topics that may be misspelled, or otherwise the relay."""
-
-    code: Code | None
-    node: str = ""
-    group: str = ""
-    misnamed: tuple[str, ...] = ()
-
-
-class _Found(NamedTuple):
-    """A finding of a cause in one group, and the topics of that group that it is about."""
-
-    facts: GroupFacts
-    finding: Finding
-    topics: tuple[str, ...]
 
 
 class _Said:
@@ -81,13 +61,14 @@ class CauseLog:
     def __init__(self) -> None:
         self._found: dict[str, tuple[GroupFacts, tuple[Finding, ...]]] = {}
         self._heard: dict[str, int] = {}
-        self._published_by: dict[str, str] = {}
+        self.published_by: dict[str, str] = {}
+        """Which node publishes a topic, or did when it was last seen."""
         self._waiting: list[tuple[str, Remark]] = []
         self._since = 0
-        self._said: dict[_Cause, _Said] = {}
-        self._hit: dict[tuple[_Cause, Code | None], set[str]] = {}
-        self._silenced_by: dict[str, _Cause] = {}
-        self._ends: dict[tuple[_Cause, Code | None], _End] = {}
+        self._said: dict[Cause, _Said] = {}
+        self._hit: dict[tuple[Cause, Code | None], set[str]] = {}
+        self._silenced_by: dict[str, Cause] = {}
+        self._ends: dict[tuple[Cause, Code | None], _End] = {}
 
     def watch(self, groups: Iterable[str]) -> None:
         """Forget all groups but these."""
@@ -104,7 +85,7 @@ class CauseLog:
         self._heard[facts.name] = now
         for each in facts.inputs:
             if named := [publisher.node for publisher in each.graph.publishers if publisher.is_named]:
-                self._published_by[each.name] = " and ".join(sorted(set(named)))
+                self.published_by[each.name] = " and ".join(sorted(set(named)))
         for remark in remarks:
             self._wait([(facts.name, remark)], now)
 
@@ -127,7 +108,7 @@ class CauseLog:
                     yield _line(Severity.OK, end.remark.text, groups, end.remark.code)
 
     def _merged(self, waiting: Sequence[tuple[str, Remark]], now: int) -> Iterator[Line]:
-        warned: dict[_Cause, list[tuple[str, Remark]]] = {}
+        warned: dict[Cause, list[tuple[str, Remark]]] = {}
         for group, remark in waiting:
             if remark.severity is Severity.OK:
                 self._end(group, remark, now)
@@ -137,7 +118,7 @@ class CauseLog:
         for cause, remarks in warned.items():
             yield from self._warn(cause, remarks, now)
 
-    def _causes_of(self, group: str, remark: Remark) -> Sequence[_Cause]:
+    def _causes_of(self, group: str, remark: Remark) -> Sequence[Cause]:
         facts, _ = self._found[group]
         causes = dict.fromkeys(cause for each in remark.findings for cause in self._topics_by_cause(facts, each))
         is_silence = any(each.severity is Severity.ERROR for each in remark.findings)
@@ -147,37 +128,11 @@ class CauseLog:
             self._silenced_by.setdefault(group, next(iter(causes)))
         return [*causes]
 
-    def _topics_by_cause(self, facts: GroupFacts, finding: Finding) -> Mapping[_Cause, tuple[str, ...]]:
-        """Return the causes of a finding, each with its topics."""
-        if not finding.about and finding.code in OF_RELAY:
-            return {_Cause(finding.code): ()}
-        if not finding.about or finding.code not in OF_PUBLISHER:
-            return {_Cause(finding.code, group=facts.name): tuple(facts.inputs[index].name for index in finding.about)}
-        topics = [facts.inputs[index].name for index in finding.about]
-        nodes = [self._published_by.get(topic, "") for topic in topics]
-        if len(set(nodes)) > 1 and finding.code is Code.SILENT and self._is_all_silent():
-            return {_Cause(finding.code): tuple(topics)}
-        by_cause: dict[_Cause, tuple[str, ...]] = {}
-        for topic, node in zip(topics, nodes, strict=True):
-            # A suggested name fits one topic only, so each misspelled topic is a cause of its own.
-            is_misnamed = not node and any(facts.inputs[index].graph.alike for index in finding.about)
-            cause = _Cause(finding.code, node, misnamed=tuple(topics) if is_misnamed else ())
-            by_cause[cause] = (*by_cause.get(cause, ()), topic)
-        return by_cause
-
-    def _is_all_silent(self) -> bool:
-        """Whether no group receives anything: then the network, or a player of recordings, is the likely cause."""
-        return all(
-            any(each.code is Code.SILENT and len(each.about) == len(facts.inputs) for each in findings)
-            for facts, findings in self._found.values()
-            if not facts.asleep
-        )
-
-    def _warn(self, cause: _Cause, remarks: Sequence[tuple[str, Remark]], now: int) -> Iterator[Line]:
+    def _warn(self, cause: Cause, remarks: Sequence[tuple[str, Remark]], now: int) -> Iterator[Line]:
         if cause.group:
             for group, remark in remarks:
                 found, hit = self._found_then(cause, [(group, remark)]), [self._found[group][0]]
-                yield _line(Severity.WARN, _text(cause, found, hit), (group,), cause.code)
+                yield _line(Severity.WARN, sentence(cause, found, hit), (group,), cause.code)
             return
         said = self._said.setdefault(cause, _Said())
         hit_by = {*self._hit.get((cause, None), ()), *self._hit.get((cause, cause.code), ())}
@@ -196,9 +151,9 @@ class CauseLog:
             return
         said.topics, said.groups, said.at = said.topics | topics, said.groups | groups, now
         said.again, said.pause = now + said.pause, min(2 * said.pause, _LONGEST_PAUSE)
-        yield _line(Severity.WARN, _text(cause, found, hit), [each.name for each in hit], cause.code)
+        yield _line(Severity.WARN, sentence(cause, found, hit), [each.name for each in hit], cause.code)
 
-    def _found_of(self, cause: _Cause) -> list[_Found]:
+    def _found_of(self, cause: Cause) -> list[Found]:
         """Return the findings of a cause in all groups, the most severe first."""
         now = (
             (facts, finding)
@@ -206,22 +161,25 @@ class CauseLog:
             for finding in findings
             if finding.code is cause.code and finding.severity is not Severity.OK and not finding.is_over
         )
-        return sorted(self._of_cause(cause, now), key=lambda each: (-each.finding.severity, each.finding.input is None))
+        return worst_first(self._of_cause(cause, now))
 
-    def _found_then(self, cause: _Cause, remarks: Sequence[tuple[str, Remark]]) -> list[_Found]:
+    def _found_then(self, cause: Cause, remarks: Sequence[tuple[str, Remark]]) -> list[Found]:
         """Return the findings of the time of the remarks, which may be over by now."""
         then = ((self._found[group][0], finding) for group, remark in remarks for finding in remark.findings)
         return self._of_cause(cause, then)
 
-    def _of_cause(self, cause: _Cause, found: Iterable[tuple[GroupFacts, Finding]]) -> list[_Found]:
+    def _of_cause(self, cause: Cause, found: Iterable[tuple[GroupFacts, Finding]]) -> list[Found]:
         return [
-            _Found(facts, finding, topics)
+            Found(facts, finding, topics)
             for facts, finding in found
             for each, topics in self._topics_by_cause(facts, finding).items()
             if each == cause
         ]
 
-    def _groups_of(self, cause: _Cause, found: Sequence[_Found], topics: frozenset[str]) -> list[GroupFacts]:
+    def _topics_by_cause(self, facts: GroupFacts, finding: Finding) -> Mapping[Cause, tuple[str, ...]]:
+        return topics_by_cause(facts, finding, self.published_by, self._found.values())
+
+    def _groups_of(self, cause: Cause, found: Sequence[Found], topics: frozenset[str]) -> list[GroupFacts]:
         names = {each.facts.name for each in found}
         return [
             facts
@@ -236,8 +194,8 @@ class CauseLog:
         if remark.findings:
             causes = [cause for each in remark.findings for cause in self._topics_by_cause(facts, each)]
         else:
-            causes = [self._silenced_by.pop(group, _Cause(None, group=group))]
-        key = next(((cause, remark.code) for cause in causes), (_Cause(None, group=group), remark.code))
+            causes = [self._silenced_by.pop(group, Cause(None, group=group))]
+        key = next(((cause, remark.code) for cause in causes), (Cause(None, group=group), remark.code))
         for (cause, code), hit in self._hit.items():
             if code is remark.code and (code is None or cause in causes):
                 hit.discard(group)
@@ -248,43 +206,4 @@ class CauseLog:
 
 
 def _line(severity: Severity, text: str, groups: Sequence[str], code: Code | None) -> Line:
-    return Line(severity, f"{_named(groups)}: {text}", tuple(groups), code)
-
-
-def _named(groups: Sequence[str]) -> str:
-    """Return `front`, or `5 groups (front, rear, left and 2 more)`."""
-    if len(groups) == 1:
-        return groups[0]
-    return f"{counted(len(groups), 'group')} ({_listed(groups)})"
-
-
-def _listed(names: Sequence[str]) -> str:
-    rest = len(names) - _NAMED
-    return all_of(names if rest <= 1 else [*names[:_NAMED], f"{rest} more"])
-
-
-def _text(cause: _Cause, found: Sequence[_Found], hit: Sequence[GroupFacts]) -> str:
-    """Word a cause as the worst affected group words it, then add the other topics, the node and the silence."""
-    first, own = found[0].finding, found[0].topics
-    text, said = first.text, f"{first.text} {first.suggestion}"
-    others = [topic for topic in dict.fromkeys(each for one in found for each in one.topics) if topic not in own]
-    is_shared = bool(others) or len(hit) > 1
-    if others:
-        text += f"; the same holds for {_listed(others)}"
-    elif is_shared and len(own) > 1 and not any(_names(text, topic) for topic in own):
-        text += f": {_listed(own)}"
-    if is_shared and cause.node and not _names(said, cause.node):
-        text += f"; {cause.node} published {'them' if others or len(own) > 1 else 'it'}"
-    text = f"{text}; {first.suggestion}" if first.suggestion else text
-    silent = [each for each in hit if each.is_silent]
-    if not silent:
-        return text
-    if len(silent) < len(hit):
-        return f"{len(silent)} of them {'gives' if len(silent) == 1 else 'give'} no sets: {text}"
-    ever = "no set" if all(each.figures.last_set is None for each in silent) else "no more sets"
-    return f"{ever} for {words.seconds(max(each.silent_for for each in silent))}: {text}"
-
-
-def _names(text: str, name: str) -> bool:
-    """Whether a text contains a name, not merely as part of a longer one."""
-    return re.search(rf"(?<![\w/]){re.escape(name)}(?![\w/])", text) is not None
+    return Line(severity, f"{named(groups)}: {text}", tuple(groups), code)

@@ -104,6 +104,11 @@ class Monitor:
         """The names of the groups that have no report."""
         return tuple(binding.group.config.name for binding in self._bindings if binding.group not in self._reports)
 
+    @property
+    def published_by(self) -> dict[str, str]:
+        """Which node publishes a topic, or did when it was last seen."""
+        return self._cause_log.published_by.copy()
+
     def watch(self, bindings: Sequence[GroupBinding]) -> None:
         """Evaluate these groups from now on; what is known of those that were there before stays."""
         now = self._runtime.time_ns()

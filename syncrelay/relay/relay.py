@@ -351,6 +351,7 @@ class Relay:
             refused_reloads=self._groups.refused_reloads,
             reload_error=self._groups.reload_error,
             unjudged=self.monitor.unjudged,
+            published_by=self.monitor.published_by,
         )
 
     def drain(self) -> tuple[GroupReport, ...]:

@@ -320,11 +320,31 @@ class Group:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Trouble:
+    """What is wrong now, by the findings that explain most; what has one cause is one, however many groups it hits."""
+
+    code: Text
+    """The code of the finding."""
+    severity: Level
+    """How bad it is at worst; `warn` or `error`."""
+    text: Text
+    """A sentence for people; its words may change with a version."""
+    suggestion: Text | None
+    """What to do about it."""
+    groups: tuple[Text, ...]
+    """The groups that it hits."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Status:
     """A relay at one moment."""
 
     relay: Relay
     """The relay as a whole."""
+    headline: Text = ""
+    """One sentence on all groups."""
+    troubles: tuple[Trouble, ...] = ()
+    """What is wrong, the worst first."""
     groups: tuple[Group, ...]
     """The groups, as in the file."""
 

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from syncrelay import own_version
@@ -17,10 +17,13 @@ from syncrelay.explain import (
     InputFacts,
     Mismatch,
     Sender,
+    Trouble,
     explanation,
+    troubles,
 )
 from syncrelay.status import document
 from syncrelay.status.document import Level, Phase
+from syncrelay.status.headline import headline
 from syncrelay.sync import DropReason
 
 _NS_PER_MS: Final = 1_000_000
@@ -43,6 +46,8 @@ class RelayState:
     reload_error: str | None = None
     unjudged: tuple[str, ...] = ()
     """Groups without a report, as all are before the first one."""
+    published_by: Mapping[str, str] = field(default_factory=dict)
+    """Which node publishes a topic, or did when it was last seen."""
 
 
 def level(report: GroupReport) -> Level:
@@ -99,7 +104,24 @@ def status_of(state: RelayState) -> document.Status:
         reload_error=state.reload_error,
         pid=os.getpid(),
     )
-    return document.Status(relay=relay, groups=tuple(map(group_of, state.groups)))
+    groups = tuple(map(group_of, state.groups))
+    found = [(report.facts, report.problems) for report in state.groups]
+    return document.Status(
+        relay=relay,
+        headline=headline(state.phase, groups),
+        troubles=tuple(map(_trouble, troubles(found, state.published_by))),
+        groups=groups,
+    )
+
+
+def _trouble(found: Trouble) -> document.Trouble:
+    return document.Trouble(
+        code=found.code.value,
+        severity=document.Level(found.severity.name.lower()),
+        text=found.text,
+        suggestion=found.suggestion,
+        groups=found.groups,
+    )
 
 
 def group_of(report: GroupReport) -> document.Group:

@@ -68,7 +68,7 @@ class TopApp(App[None]):
     BINDINGS: ClassVar[list[BindingType]] = [Binding("ctrl+c", "quit", "Quit", show=False, priority=True)]
 
     view: reactive[View | None] = reactive(None)
-    order: reactive[Order] = reactive(Order.FILE)
+    order: reactive[Order] = reactive(Order.WORST)
 
     def __init__(
         self, relays: Sequence[Answer], *, source: Callable[[str], Answer] = ask, period_s: float = _PERIOD_S
@@ -129,7 +129,7 @@ class TopApp(App[None]):
             self._latest = View(event.heard)
         else:
             self._latest = View(self._latest.answer, str(event.heard), now - self._answered_at)
-        if self.view is not None and not self.view.paused:
+        if self.view is not None and not self.view.frozen:
             self.view = self._latest
 
     @on(OptionList.OptionSelected)
@@ -137,14 +137,14 @@ class TopApp(App[None]):
         if isinstance(self.screen, RelaysScreen):
             self._watch(next(answer for answer in self._relays if answer.url == event.option.id))
 
-    def action_pause(self) -> None:
+    def action_freeze(self) -> None:
         """Hold the screen still, or go on with the latest answer."""
         if self.view is None or self._latest is None:
             return
-        if self.view.paused:
+        if self.view.frozen:
             self.view = self._latest
         else:
-            self.view = View(self.view.answer, self.view.trouble, self.view.quiet_s, paused=True)
+            self.view = View(self.view.answer, self.view.trouble, self.view.quiet_s, frozen=True)
 
     def action_sort(self) -> None:
         """Sort the groups in the next order."""

@@ -19,8 +19,9 @@ _KEYS: Final = (
     ("enter", "open the selected group"),
     ("left, right, p, n", "in a group: the one before, the next"),
     ("escape, backspace", "back to the groups, or to the list of relays"),
-    ("space", "pause the screen, and resume"),
-    ("s", "sort: as in the file, worst first, by name"),
+    ("space", "freeze the screen, and go on"),
+    ("s", "sort: worst first, as in the file, by name"),
+    ("/", "show the groups that hold a text; escape shows all"),
     ("q, ctrl-c", "quit"),
 )
 _MEANINGS: Final = (

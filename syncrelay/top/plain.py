@@ -50,15 +50,19 @@ def summary_of(moment: Moment) -> str:
 def plain_text(answer: Answer) -> str:
     """Return all of a status in lines of at most WIDTH columns; only words that are longer stick out."""
     relay = answer.status.relay
-    lines = wrapped(f"{relay.node} {phrases.place(relay, answer.url)}: {_of_relay(relay)}")
+    lines = wrapped(answer.status.headline) + wrapped(
+        f"{relay.node} {phrases.place(relay, answer.url)}: {_of_relay(relay)}"
+    )
     for group in answer.status.groups:
         lines += ["", *group_lines(group)]
     return "\n".join(lines)
 
 
 def summary(status: Status) -> str:
-    """Return a line for the relay, and one for each group with the finding that explains most."""
-    return "\n".join([f"{status.relay.node}: {_of_relay(status.relay)}", *map(_summary_of, status.groups)])
+    """Return a line on all groups, one for the relay, and one for each group with the finding that explains most."""
+    return "\n".join(
+        [status.headline, f"{status.relay.node}: {_of_relay(status.relay)}", *map(_summary_of, status.groups)]
+    )
 
 
 def _summary_of(group: Group) -> str:

@@ -11,14 +11,14 @@ from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 from textual.events import Resize
 from textual.screen import Screen
-from textual.widgets import Footer, OptionList, Static
+from textual.widgets import Footer, Input, OptionList, Static
 
 from syncrelay.status.document import Group
 from syncrelay.top import group_blocks
 from syncrelay.top.group_rows import columns_of, heading, row
 from syncrelay.top.pieces import line, screenful
 from syncrelay.top.rows import MARK_WIDTH, Rows
-from syncrelay.top.view import Order, View, title
+from syncrelay.top.view import Order, View, holds, title
 
 LEAST_WIDTH, LEAST_HEIGHT = 60, 15
 # The rest is for the selected group.
@@ -31,12 +31,15 @@ class ShowsView(Protocol):
     view: View | None
     order: Order
 
+    def action_relays(self) -> None:
+        """Go back to the list of relays."""
+
 
 class WatchScreen(Screen[None]):
     """Shows the application's view, and draws it again whenever it or the size of the terminal changes."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("space", "app.pause", "Pause"),
+        Binding("space", "app.freeze", "Freeze"),
         Binding("question_mark", "app.keys", "Keys", key_display="?"),
         Binding("q", "app.quit", "Quit"),
     ]
@@ -92,13 +95,16 @@ class WatchScreen(Screen[None]):
 class GroupsScreen(WatchScreen):
     """The list of groups, and below it the selected one."""
 
+    AUTO_FOCUS = "Rows"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("s", "app.sort", "Sort"),
-        Binding("escape,backspace", "app.relays", "Relays", show=False),
+        Binding("slash", "filter", "Filter", key_display="/"),
+        Binding("escape,backspace", "back", "Relays", show=False),
     ]
 
     def compose_body(self) -> ComposeResult:
         """Lay out the list above and the selected group below."""
+        yield Input(placeholder="a part of a name, topic, state or finding", id="filter", compact=True)
         yield Static(id="heading")
         yield Rows()
         yield Static(id="detail")
@@ -106,7 +112,9 @@ class GroupsScreen(WatchScreen):
     def draw_body(self, view: View, *, height: int) -> None:
         """Draw the groups, and as much of the selected one as there is room for."""
         width = self.size.width
-        groups = view.groups(self.shown.order)
+        sought = self.query_one(Input)
+        height -= int(sought.display)
+        groups = [group for group in view.groups(self.shown.order) if holds(group, sought.value)]
         listed = self.query_one(Rows)
         listed_lines = min(len(groups), max(3, int(height * _LIST_SHARE)))
         listed.styles.height = listed_lines
@@ -117,7 +125,38 @@ class GroupsScreen(WatchScreen):
         left = height - 1 - listed_lines
         shown = view.group(listed.selected) if listed.selected else None
         lines = _summary(shown, width=width, height=left) if shown else []
+        if sought.value and not groups:
+            lines = [line(f"no group has {sought.value!r}; escape shows all")]
         self.query_one("#detail", Static).update(screenful(_clipped(lines, left), width))
+
+    def on_mount(self) -> None:
+        """Follow the view; what is sought is asked for by a key."""
+        self.query_one(Input).display = False
+        super().on_mount()
+
+    def action_filter(self) -> None:
+        """Ask which groups to show."""
+        sought = self.query_one(Input)
+        sought.display = True
+        sought.focus()
+
+    def action_back(self) -> None:
+        """Show all groups again, or else go back to the list of relays."""
+        sought = self.query_one(Input)
+        if not sought.display:
+            self.shown.action_relays()
+            return
+        sought.value, sought.display = "", False
+        self.query_one(Rows).focus()
+        self.draw()
+
+    @on(Input.Changed)
+    def _sought(self) -> None:
+        self.draw()
+
+    @on(Input.Submitted)
+    def _found(self) -> None:
+        self.query_one(Rows).focus()
 
     @on(OptionList.OptionHighlighted)
     def _selected(self) -> None:

@@ -40,12 +40,15 @@ def chosen(page) -> str:
 
 @pytest.mark.parametrize(("scheme", "width"), [("light", 390), ("dark", 1600)])
 def test_everything_is_shown_without_a_complaint_or_a_request_elsewhere(scheme, width, browser):
-    with watching(browser, states.rig(), scheme=scheme, width=width) as (opened_page, relay):
+    with watching(browser, states.rig(), at="#front", scheme=scheme, width=width) as (opened_page, relay):
         page = opened_page.page
         assert page.locator("#node").text_content() == "/syncrelay"
-        assert page.locator("#groups strong").all_text_contents() == ["front", "rear", "inertial", "radar"]
-        assert page.locator("#groups .level").all_text_contents() == ["OK", "ERROR", "ERROR", "ERROR"]
-        assert "10 of 10 sets/s" in page.locator("#groups .figures").first.text_content()
+        assert page.locator("#headline").text_content() == "3 of 4 groups fail: no sets from inertial, radar and rear"
+        assert page.title() == "✖ 3 of 4 groups fail: no sets from inertial, radar and rear · /syncrelay"
+        assert page.locator("#icon").get_attribute("data-level") == "error"
+        assert page.locator("#groups .group strong").all_text_contents() == ["inertial", "radar", "rear", "front"]
+        assert page.locator("#groups .group > .level").all_text_contents() == ["ERROR", "ERROR", "ERROR", "OK"]
+        assert "10 of 10 sets/s" in page.locator("#groups .group .figures").last.text_content()
         assert page.locator("#group .spark").all_inner_texts()[1].startswith("latency: p50 2.56 ms, p95 9.01 ms")
         assert page.locator("#group .lanes .joint").count() > 5
         assert page.locator("#group .lanes .fate-unneeded").count() > 5
@@ -65,21 +68,22 @@ def test_a_group_is_chosen_by_keys_and_by_the_address_and_says_what_to_write(bro
     with watching(browser, states.rig(), at="#inertial") as (opened_page, _):
         page = opened_page.page
         assert chosen(page) == "inertial"
-        page.keyboard.press("k")
+        page.keyboard.press("j")
+        page.keyboard.press("j")
         assert chosen(page) == "rear"
         assert page.url.endswith("#rear")
         shown = page.locator("#group .findings").text_content()
         assert "stamps of /rear/image_raw are 37.2 s behind those of /lidar/points" in shown
         assert page.locator("#group .fix code").first.text_content() == "offset: 37.156s"
-        page.keyboard.press("ArrowDown")
-        assert chosen(page) == "inertial"
+        page.keyboard.press("ArrowUp")
+        assert chosen(page) == "radar"
         page.keyboard.press("s")
-        assert page.locator("#groups strong").all_text_contents()[-1] == "front"
+        assert page.locator("#groups strong").all_text_contents()[0] == "front"
         page.locator("#groups button", has_text="radar").click()
         assert page.locator("#group h2").text_content() == "radar"
 
 
-def test_it_is_live_and_asks_for_nothing_while_it_is_paused(browser):
+def test_it_is_live_and_asks_for_nothing_while_it_is_frozen(browser):
     with watching(browser, states.healthy()) as (opened_page, relay):
         page = opened_page.page
         page.clock.install()
@@ -87,7 +91,7 @@ def test_it_is_live_and_asks_for_nothing_while_it_is_paused(browser):
         relay.state = states.rig()
         page.wait_for_selector("#groups .group:nth-child(4)")
         page.keyboard.press(" ")
-        assert page.locator("#pause").get_attribute("aria-pressed") == "true"
+        assert page.locator("#freeze").get_attribute("aria-pressed") == "true"
         asked = len(opened_page.requests)
         page.clock.run_for(10_000)
         assert len(opened_page.requests) == asked
@@ -129,15 +133,51 @@ def _is_seen(page, selector: str) -> bool:
     return page.locator(selector).first.evaluate(seen)
 
 
-def test_on_a_phone_one_gets_from_a_long_list_to_a_group_and_back(browser):
+def test_on_a_phone_a_group_opens_in_its_place_in_the_list_and_closes_again(browser):
     with watching(browser, many(), width=390) as (opened_page, _):
         page = opened_page.page
-        page.locator("#groups button", has_text="group_7").click()
-        assert _is_seen(page, "#group h2")
-        page.evaluate("scrollTo(0, document.documentElement.scrollHeight)")
-        page.locator("#back").click()
-        assert _is_seen(page, "#groups [aria-current=true]")
-        assert page.evaluate("document.activeElement.querySelector('strong').textContent") == "group_7"
+        assert page.locator("#group").is_hidden()
+        row = page.locator("#groups button", has_text="group_7")
+        row.click()
+        assert page.locator("#group h2").text_content() == "group_7"
+        assert row.evaluate("each => each.nextElementSibling.id") == "group"
+        assert _is_seen(page, "#groups [aria-expanded=true]")
+        page.locator("#groups button", has_text="group_8").click()
+        assert page.locator("#group h2").text_content() == "group_8"
+        assert _is_seen(page, "#groups [aria-expanded=true]")
+        page.locator("#groups button", has_text="group_8").click()
+        assert page.locator("#group").is_hidden()
+        page.set_viewport_size({"width": 1600, "height": 900})
+        page.wait_for_selector("main > #group:not([hidden])")
+
+
+@pytest.mark.parametrize("width", [390, 1600])
+def test_what_several_groups_suffer_of_is_one_card_that_shows_these_groups(width, browser):
+    group = states.group({"/camera/image_raw": states.IMAGE, "/lidar/points": states.CLOUD})
+    sensors = {
+        "/camera/image_raw": states.CAMERA,
+        "/lidar/points": replace(states.LIDAR, until_s=12),
+        "/imu/data": states.IMU_200,
+    }
+    well = states.group({"/camera/image_raw": states.IMAGE, "/imu/data": states.IMU})
+    with watching(browser, states.simulated(states.file(a=group, b=well, c=group), sensors), width=width) as (shown, _):
+        page = shown.page
+        card = page.locator("#troubles article")
+        assert card.count() == 1
+        assert "ERROR no more sets for 18 s: /lidar/points has been silent for 18 s" in card.text_content()
+        assert card.locator("button").text_content() == "2 groups: a, c"
+        card.locator("button").click()
+        assert page.locator("#groups .group strong").all_text_contents() == ["a", "c"]
+        card.locator("button").click()
+        assert page.locator("#groups .group").count() == 3
+        page.keyboard.press("/")
+        page.keyboard.type("imu")
+        assert page.locator("#groups .group strong").all_text_contents() == ["b"]
+        page.keyboard.type(" and nothing")
+        assert page.locator("#groups").text_content() == 'no group has "imu and nothing"'
+        page.keyboard.press("Escape")
+        assert page.locator("#groups .group").count() == 3
+        assert shown.complaints == []
 
 
 def test_the_chosen_group_stays_beside_a_long_list_and_where_the_focus_is_can_be_seen(browser):
@@ -170,7 +210,7 @@ def test_an_answer_of_something_else_is_said_and_another_version_brings_its_own_
 
 def test_a_relay_without_groups_has_a_page_too(browser):
     with watching(browser, replace(states.rig(), groups=())) as (opened_page, _):
-        assert opened_page.page.locator("#groups").text_content() == "no group is running yet"
+        assert opened_page.page.locator("#groups").text_content().startswith("no group is running yet: ")
         assert opened_page.complaints == []
 
 
@@ -199,12 +239,12 @@ def test_names_from_strangers_run_nothing_and_hide_nothing(browser):
 
 def test_a_row_of_the_list_has_the_colour_of_its_level_and_keeps_figures_and_units_together(browser):
     with watching(browser, states.rig()) as (opened_page, _):
-        for colour, has in (("borderLeftColor", ".group"), ("color", ".level")):
+        for colour, has in (("borderLeftColor", ".group"), ("color", ".group > .level")):
             found = opened_page.page.locator(f"#groups {has}").evaluate_all(
                 f"all => all.map(each => getComputedStyle(each).{colour})"
             )
             assert len(set(found)) == 2
-            assert found[1:] == [found[1]] * 3
+            assert found[:3] == [found[0]] * 3
         figures = opened_page.page.locator("#groups .figures span")
         assert figures.count() == 3 * 4
         assert figures.evaluate_all("all => all.map(each => getComputedStyle(each).whiteSpace)") == ["nowrap"] * 12
@@ -247,7 +287,7 @@ def test_of_each_publisher_it_is_shown_what_was_sent_delivered_and_lost(scheme, 
     senders = Sender("/usb_cam", 200, 188, sent_hz=20.0), Sender("/spare_cam", 4, 4)
     inputs = tuple(replace(of, graph=replace(of.graph, senders=each)) for of, each in ((camera, senders), (lidar, ())))
     state = replace(told, groups=(replace(report, facts=replace(report.facts, inputs=inputs)), *others))
-    with watching(browser, state, scheme=scheme, width=width) as (opened_page, _):
+    with watching(browser, state, at="#front", scheme=scheme, width=width) as (opened_page, _):
         shown = opened_page.page.locator("#group .input dl").all_inner_texts()
         sent = "200 by /usb_cam at 20 Hz: 188 delivered, 12 lost; 4 by /spare_cam: 4 delivered, 0 lost"
         assert f"sent in the last 10 s\n{sent}\n" in shown[0]

@@ -3,15 +3,20 @@
 
 const ASKS_EVERY_MS = 1000, PATIENCE_MS = 4000;
 const LEVELS = ["error", "stale", "warn", "ok"];
+const byName = (one, other) => (one.name < other.name ? -1 : one.name > other.name ? 1 : 0);
 const ORDERS = {
+  worst: (groups) => [...groups].sort((one, other) => LEVELS.indexOf(one.level) - LEVELS.indexOf(other.level) || byName(one, other)),
   file: (groups) => groups,
-  worst: (groups) => [...groups].sort((one, other) => LEVELS.indexOf(one.level) - LEVELS.indexOf(other.level)),
-  name: (groups) => [...groups].sort((one, other) => (one.name < other.name ? -1 : one.name > other.name ? 1 : 0)),
+  name: (groups) => [...groups].sort(byName),
 };
+// Beside the list there is room for a group from this width on; below it, a group opens in its row.
+const WIDE = matchMedia("(min-width: 1000px)");
 const place = (id) => document.getElementById(id);
+// Kept here, as the list that it may stand in is made anew.
+const SECTION = place("group");
 const keys = new WeakMap();
-let state = null, order = "file", paused = false, answered = performance.now(), trouble = null;
-let chosen = hashed();
+let state = null, order = "worst", frozen = false, sought = "", answered = performance.now(), trouble = null;
+let chosen = hashed(), closed = !WIDE.matches && !chosen;
 
 function hashed() {
   try {
@@ -30,7 +35,7 @@ function fill(where, content, make) {
 }
 
 async function ask() {
-  if (!document.hidden && !paused) {
+  if (!document.hidden && !frozen) {
     try {
       const answer = await fetch("status", {cache: "no-store", signal: AbortSignal.timeout(PATIENCE_MS)});
       if (!answer.ok) throw new Error((await answer.text()).slice(0, 500));
@@ -59,15 +64,55 @@ function show() {
   if (trouble !== null) fill(place("trouble"), [trouble, Math.round(quiet)], () => [printable(`STALE: no answer for ${seconds(quiet)}: ${trouble}; still trying`)]);
   if (state === null) return;
   const {relay} = state;
-  document.title = `${printable(relay.node)} · syncrelay`;
+  const worst = LEVELS.find((level) => state.groups.some((group) => group.level === level)) ?? "warn";
+  const level = trouble !== null ? "stale" : worst;
+  document.title = `${level === "ok" ? "" : "✖ "}${printable(state.headline)} · ${printable(relay.node)}`;
+  if (place("icon").dataset.level !== level) showIcon(level);
+  place("headline").textContent = printable(state.headline);
+  place("headline").className = `level ${level}`;
   place("node").textContent = printable(relay.node);
   const failed = relay.reload_error ? `; the last reload failed: ${relay.reload_error}` : "";
   place("relay").textContent = `${relay.phase}, ${relay.ready ? "ready" : "not ready"}, up ${seconds(relay.uptime_s)}, syncrelay ${printable(relay.version)}, ${printable(relay.config + failed)}`;
-  const groups = ORDERS[order](state.groups);
+  showTroubles(state.troubles.filter((each) => each.groups.length > 1));
+  const groups = listed();
   const group = groups.find((each) => each.name === chosen) ?? groups[0];
   showList(groups, group);
   showGroup(group);
   document.documentElement.dataset.shown = String(Number(document.documentElement.dataset.shown ?? 0) + 1);
+}
+
+// The tab says what the page says: its icon has the colour of the worst group.
+function showIcon(level) {
+  const icon = place("icon"), colour = getComputedStyle(document.documentElement).getPropertyValue(level === "stale" ? "--error" : `--${level}`);
+  const mark = level === "ok" ? "<circle cx='8' cy='8' r='7'/>" : level === "warn" ? "<path d='M8 1l7 14H1z'/>" : "<path d='M1 1h14v14H1z'/>";
+  icon.dataset.level = level;
+  icon.href = `data:image/svg+xml,${encodeURIComponent(`<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 16 16' fill='${colour.trim()}'>${mark}</svg>`)}`;
+}
+
+// What the groups of a card suffer of is said of each of them, too: the card shows them alone.
+function showTroubles(troubles) {
+  fill(place("troubles"), troubles, () => troubles.map((each) => {
+    const names = element("button", {type: "button", class: "names"}, `${each.groups.length} groups: ${each.groups.join(", ")}`);
+    names.addEventListener("click", () => seek(sought === groupsOf(each) ? "" : groupsOf(each)));
+    return element("article", {class: `note ${each.severity}`}, element("p", {}, element("strong", {class: `level ${each.severity}`}, `${each.severity.toUpperCase()} `), each.text),
+      ...(each.suggestion ? [element("p", {class: "fix"}, ...withCode(each.suggestion))] : []), names);
+  }));
+}
+
+function groupsOf({groups}) {
+  return groups.join(" | ");
+}
+
+// The groups that hold what is sought; "a | b" are those of these names.
+function listed() {
+  const names = sought.includes(" | ") ? new Set(sought.split(" | ")) : null, text = sought.toLowerCase();
+  const holds = (group) => [group.name, group.level, ...group.inputs.map((each) => each.topic), ...group.findings.flatMap((each) => [each.code.replaceAll("_", " "), each.text])].join("\n").toLowerCase().includes(text);
+  return ORDERS[order](state.groups).filter((group) => (names ? names.has(group.name) : holds(group)));
+}
+
+function seek(text) {
+  sought = place("filter").value = text;
+  if (state) show();
 }
 
 function showList(groups, current) {
@@ -77,10 +122,13 @@ function showList(groups, current) {
     row.addEventListener("click", () => choose(group.name, true));
     return row;
   }));
-  if (!groups.length) fill(place("groups"), "none", () => [element("p", {}, "no group is running yet")]);
+  if (!groups.length) fill(place("groups"), ["none", sought], () => [element("p", {}, sought ? `no group has "${sought}"` : "no group is running yet: the relay starts, or its file has none")]);
+  const rows = [...place("groups").querySelectorAll(".group")];
   groups.forEach((group, at) => {
-    const row = place("groups").children[at], [, level, figures, why] = row.children;
+    const row = rows[at], [, level, figures, why] = row.children;
     row.setAttribute("aria-current", String(group === current));
+    if (WIDE.matches) row.removeAttribute("aria-expanded");
+    else row.setAttribute("aria-expanded", String(group === current && !closed));
     row.className = `group ${group.level}`;
     level.className = `level ${group.level}`;
     level.textContent = group.level.toUpperCase();
@@ -94,27 +142,20 @@ function showList(groups, current) {
 const BLOCKS = ["head", "findings", "figures", "lanes", "inputs"];
 
 function showGroup(group) {
-  const section = place("group");
+  const section = SECTION, row = document.querySelector("#groups [aria-current=true]");
+  // On a phone it is in the list, below its row.
+  if (WIDE.matches || !row) { if (section.parentElement !== document.querySelector("main")) document.querySelector("main").append(section); }
+  else if (section.previousElementSibling !== row) row.after(section);
+  section.hidden = !group || (closed && !WIDE.matches);
   if (!group) return fill(section, null, () => []);
-  fill(section, group.name, () => [backButton(), ...BLOCKS.map((name) => element("div", {class: name}))]);
-  const [, head, findings, figures, recent, inputs] = section.children;
+  fill(section, group.name, () => BLOCKS.map((name) => element("div", {class: name})));
+  const [head, findings, figures, recent, inputs] = section.children;
   fill(head, [group.name, options(group)], () => [element("h2", {}, group.name), element("p", {class: "faint"}, options(group))]);
   fill(findings, group.findings, () => group.findings.map(finding));
   fill(figures, [group.sets, group.rate_hz, group.possible_hz, group.since_last_set_ms, group.last_sets], () => figuresOf(group));
   const width = Math.floor(recent.clientWidth);
   fill(recent, [width, group.sets, group.recent], () => (group.recent.length ? recentOf(group, width) : []));
   fill(inputs, group.inputs, () => [element("h3", {}, "Inputs"), element("div", {class: "cards"}, ...group.inputs.map((each) => input(group, each)))]);
-}
-
-// On a phone the list is above the group.
-function backButton() {
-  const button = element("button", {type: "button", id: "back"}, "All groups ↑");
-  button.addEventListener("click", () => {
-    const row = document.querySelector("#groups [aria-current=true]");
-    row.scrollIntoView({block: "center"});
-    row.focus({preventScroll: true});
-  });
-  return button;
 }
 
 function options(group) {
@@ -195,26 +236,28 @@ function nodes(endpoints) {
 }
 
 function choose(name, isClicked) {
+  const row = document.querySelector("#groups [aria-current=true]");
+  closed = isClicked && !WIDE.matches && !closed && row?.firstChild.textContent === printable(name);
   chosen = name;
   history.replaceState(null, "", `#${encodeURIComponent(name.toWellFormed?.() ?? name)}`);
   show();
-  // On a phone the group is below the list.
-  if (isClicked && place("group").getBoundingClientRect().top > innerHeight * 0.6) place("group").scrollIntoView();
+  // What was open above it and closed has moved the row away.
+  if (isClicked && !WIDE.matches) document.querySelector("#groups [aria-current=true]").scrollIntoView({block: "nearest"});
 }
 
 function step(by) {
-  const groups = state ? ORDERS[order](state.groups) : [];
+  const groups = state ? listed() : [];
   if (!groups.length) return;
   const at = Math.max(0, groups.findIndex((group) => group.name === chosen));
   const next = Math.min(groups.length - 1, Math.max(0, at + by));
   choose(groups[next].name, false);
-  place("groups").children[next].focus();
+  document.querySelector("#groups [aria-current=true]").focus();
 }
 
-function pause() {
-  paused = !paused;
-  place("pause").setAttribute("aria-pressed", String(paused));
-  place("pause").textContent = paused ? "Paused: resume" : "Pause";
+function freeze() {
+  frozen = !frozen;
+  place("freeze").setAttribute("aria-pressed", String(frozen));
+  place("freeze").textContent = frozen ? "Frozen: go on" : "Freeze";
 }
 
 function sort() {
@@ -224,18 +267,24 @@ function sort() {
   show();
 }
 
-const KEYS = {j: () => step(1), ArrowDown: () => step(1), k: () => step(-1), ArrowUp: () => step(-1), " ": pause, s: sort};
+const KEYS = {j: () => step(1), ArrowDown: () => step(1), k: () => step(-1), ArrowUp: () => step(-1), " ": freeze, s: sort, "/": () => place("filter").focus()};
 
 addEventListener("keydown", (event) => {
   const act = KEYS[event.key];
   // What is focused has the space for itself, and the arrows scroll where no group is chosen by them.
-  if (!act || event.ctrlKey || event.metaKey || event.altKey || (event.key === " " && event.target.closest(".controls, #back, a"))) return;
+  if (event.target === place("filter")) {
+    if (event.key === "Escape") { seek(""); place("filter").blur(); }
+    return;
+  }
+  if (!act || event.ctrlKey || event.metaKey || event.altKey || (event.key === " " && event.target.closest(".controls, .names, a"))) return;
   if (event.key.startsWith("Arrow") && !event.target.closest("#groups")) return;
   event.preventDefault();
   act();
 });
 addEventListener("hashchange", () => { chosen = hashed(); show(); });
 addEventListener("resize", () => show());
-place("pause").addEventListener("click", pause);
+WIDE.addEventListener("change", () => show());
+place("filter").addEventListener("input", (event) => seek(event.target.value));
+place("freeze").addEventListener("click", freeze);
 place("sort").addEventListener("click", sort);
 ask();
