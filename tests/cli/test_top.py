@@ -18,7 +18,7 @@ def test_the_state_is_printed_once_as_text_of_80_columns(tmp_path):
         shown = run("top", "--once", "--url", server.url, folder=tmp_path)
     assert (shown.returncode, shown.stderr) == (0, "")
     lines = shown.stdout.splitlines()
-    assert lines[0].startswith(f"/syncrelay at {server.url}: running, not ready, up 30 s, syncrelay")
+    assert lines[1].startswith(f"/syncrelay at {server.url}: running, not ready, up 30 s, syncrelay")
     assert "front: OK, 10 of 10 possible sets a second, 300 sets, last just now" in lines
     assert "  latency: p50 2.56 ms, p95 9.01 ms, max 11.3 ms" in lines
     finding = states.rig().groups[1].findings[0]

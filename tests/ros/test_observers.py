@@ -64,7 +64,8 @@ def test_a_file_is_tried_on_a_terminal_and_one_that_fits_is_written(stage: Stage
     assert "would have left: 0 sets" in told
     # An error once the group is silent, which takes longer than to see why.
     assert re.search("exit code 1: front has 1 (warning|error)", told)
-    lines = told.splitlines()[1:]
+    # What was logged meanwhile, where the look took long, stands as it is.
+    lines = [line for line in told.splitlines()[1:] if not line.startswith("[WARN]")]
     assert [line for line in lines if len(line) > 70 and not line.startswith("    ")] == []
     (group,) = load_text((stage.folder / "new.yaml").read_text()).groups
     assert group.options.model_dump()["slop"] == 7 * MS
