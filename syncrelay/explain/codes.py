@@ -71,7 +71,7 @@ class Code(Enum):
     CLOCK_STEP = "clock_step", Of.MESSAGES, _WARN_OR_ERROR
     CLOCK_DRIFT = "clock_drift", Of.MESSAGES, _WARN
     OTHER_CLOCK = "other_clock", Of.MESSAGES, _WARN_OR_ERROR
-    NO_COMMON_KEY = "no_common_key", Of.MESSAGES, _ERROR
+    NO_COMMON_KEY = "no_common_key", Of.MATCHING, _ERROR
     SLOWED = "slowed", Of.MESSAGES, _WARN
     BURSTS = "bursts", Of.MESSAGES, _WARN
     TIME_JUMP = "time_jump", Of.ORDER, _ANY

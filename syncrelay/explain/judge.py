@@ -46,7 +46,6 @@ _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     Rule(Code.CLOCK_DRIFT, rules_drift.clock_drift),
     Rule(Code.OTHER_CLOCK, rules_stamps.other_clock),
     Rule(Code.OTHER_CLOCK, rules_clock.off_the_clock),
-    Rule(Code.NO_COMMON_KEY, rules_stamps.no_common_key),
     of_each_input(Code.SLOWED, rules_flow.slowed),
     Rule(Code.BURSTS, rules_flow.bursts),
     of_each_input(Code.TIME_JUMP, rules_stamps.time_jump),
@@ -55,6 +54,7 @@ _CAUSE_RULES: Final[tuple[Rule, ...]] = (
 )
 
 _MATCHING_RULES: Final[tuple[Rule, ...]] = (
+    Rule(Code.NO_COMMON_KEY, rules_stamps.no_common_key),
     Rule(Code.OVER_SLOP, rules_matching.over_slop),
     Rule(Code.OVER_SLOP, rules_clock.too_old),
     of_each_input(Code.SHORT_QUEUE, rules_matching.short_queue),

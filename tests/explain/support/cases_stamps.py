@@ -123,6 +123,11 @@ FOUND = {
 
 # By the code that must not be found.
 QUIETLY = {
+    Code.NO_COMMON_KEY: {
+        "keys while two publishers have the matching restart": a_silent_group(
+            camera(key="c7", figures=SWINGING, publishers=TWO), an_input("/lidar", key="c6"), by_stamp=False
+        ),
+    },
     Code.CONSTANT_OFFSET: {
         "a constant distance that its delay explains": a_group(
             camera(figures=stamped(0, delay=80 * MS)), an_input("/lidar", figures=stamped(0))
