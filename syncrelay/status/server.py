@@ -9,7 +9,7 @@ import socket
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache
-from threading import Thread
+from threading import Event, Thread
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self
 
@@ -78,6 +78,7 @@ class Server:
         # The sockets that waitress watches, by their descriptors.
         self._channels: dict[int, Any] = {}
         self._server: Any = None
+        self._ends = Event()
         self._thread: Thread | None = None
 
     def __enter__(self) -> Self:
@@ -88,10 +89,12 @@ class Server:
     ) -> None:
         self._announcement.__exit__(kind, error, trace)
         if self._thread is not None:
-            # waitress cannot be stopped from another thread.
-            self._server.trigger.pull_trigger(lambda: close_all(self._channels))
-            self._thread.join()
             self._server.task_dispatcher.shutdown()
+            self._ends.set()
+            # Wakes the loop. What it waits on stays open until it has ended: it may have been woken already.
+            self._server.pull_trigger()
+            self._thread.join()
+            close_all(self._channels)
         self._socket.close()
 
     def serve(self, state: Callable[[], RelayState], taps: Taps) -> None:
@@ -115,7 +118,7 @@ class Server:
         self._announcement = announce(self.place)
 
     def _run(self) -> None:
-        while self._channels:
+        while not self._ends.is_set():
             if len(self._channels) >= _CONNECTIONS:
                 self._make_room()
             self._server.asyncore.loop(timeout=1, map=self._channels, use_poll=True, count=1)

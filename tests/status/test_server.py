@@ -7,6 +7,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import replace
 
 import pytest
+from waitress.trigger import trigger
 
 from syncrelay.config.listen import Listen
 from syncrelay.errors import ListenError
@@ -215,6 +216,19 @@ def test_it_ends_with_its_threads_and_its_port_whoever_is_connected():
         assert set(threading.enumerate()) == before
         with Server(Listen(address[0], range(address[1], address[1] + 1))):
             pass
+
+
+def test_it_ends_though_something_else_woke_its_loop_first(monkeypatch):
+    pull = trigger.pull_trigger
+
+    def pull_twice(*arguments):
+        pull(*arguments)
+        (loop,) = (each for each in threading.enumerate() if each.name == "syncrelay-http")
+        loop.join()
+        pull(arguments[0])
+
+    with serving(HEALTHY):
+        monkeypatch.setattr(trigger, "pull_trigger", pull_twice)
 
 
 def test_it_ends_where_it_never_served():
