@@ -18,7 +18,7 @@ from tests.conformance.player import play
 from tests.conformance.script import PAIR, REFERENCE, do, group, short
 from tests.conformance.seen import Seen
 from tests.conformance.simulated import SimulatedWorld
-from tests.simulated.node import SimulatedNode
+from tests.simulated.node import SimulatedNode, SimulatedSource
 
 _SENSORS = (do.publisher("/a"), do.publisher("/b"))
 _EARS = (do.subscriber("/front/a"), do.subscriber("/front/b"))
@@ -138,3 +138,25 @@ def test_one_in_the_library_of_a_type_is_told_as_what_its_topic_lacks(monkeypatc
         tmp_path, *_SENSORS, rear, do.finding("type_not_importable", "rear"), *_EARS, do.ready(), do.sets(10), *_OUT
     )
     assert [each for each in seen.log if "undefined symbol" in each]
+
+
+def test_one_as_messages_are_taken_has_their_topic_subscribed_anew(monkeypatch, tmp_path):
+    sound, left = SimulatedSource.take, ["no such"]
+
+    def failing(source):
+        if left:
+            raise KeyError(left.pop())
+        return sound(source)
+
+    monkeypatch.setattr(SimulatedSource, "take", failing)
+    steps = (
+        *_SENSORS,
+        do.relay(PAIR),
+        *_EARS,
+        do.ready(),
+        do.write("/a", 10),
+        do.finding("refused_by_dds", wordless=True),
+    )
+    again = (do.served("/a", 0), do.served("/a", 1), do.ready(), do.sets(20), *_OUT)
+    seen = _play(tmp_path, *steps, *again)
+    assert sum("KeyError('no such')" in each for each in seen.log) == 1

@@ -1,43 +1,39 @@
 """Which groups the relay evaluates: all of a few, of many some in turn, and all while somebody watches."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
-from syncrelay.config import load
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from syncrelay.config import Config, load_text
+from syncrelay.relay.relay import Relay
+from tests.conformance.simulated import SimulatedWorld
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
-from tests.ros.processes import wait_until
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
-own_relay = pytest.importorskip("tests.ros.in_process", reason="rclpy is not installed").own_relay
-
-pytestmark = pytest.mark.ros
-
-_GROUPS = 12
+_NAMES = [f"g{n}" for n in range(12)]
 
 
 @pytest.fixture
-def relay_of(ros_domain: int, tmp_path, monkeypatch) -> Iterator:
-    """Start a relay of this process whose file has these keys."""
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(ros_domain))
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    started = []
+def relay_of() -> Iterator[Callable[..., Relay]]:
+    """Start a relay of groups of these names, whose file has these keys."""
+    with SimulatedWorld(1) as world:
+        started: list[Relay] = []
 
-    def start(n_groups, **keys):
-        started.append(own_relay(_loaded(tmp_path, [f"g{n}" for n in range(n_groups)], **keys)))
-        return started[-1].__enter__()
+        def start(names, **keys):
+            loaded = _loaded(names, **keys)
+            started.append(Relay(loaded, *world.join(loaded, {}), runtime=world.runtime))
+            return started[-1].__enter__()
 
-    yield start
-    for relay in started:
-        relay.close()
+        yield start
+        for relay in started:
+            relay.close()
 
 
-def _loaded(folder, names, **keys):
+def _loaded(names, **keys) -> Config:
     group = {"policy": "exact_time", "topics": inputs({"/a": VECTOR, "/b": VECTOR})}
-    path = folder / "groups.yaml"
-    path.write_text(config(dict.fromkeys(names, group), metrics=None, **keys))
-    return load(str(path))
+    return load_text(config(dict.fromkeys(names, group), metrics=None, **keys))
 
 
 def _evaluated_at(relay):
@@ -48,47 +44,45 @@ def _evaluated_at(relay):
 def _evaluated_next(relay):
     """Names of those that the relay evaluates next."""
     before = _evaluated_at(relay)
-    wait_until(lambda: relay.step() or _evaluated_at(relay) != before, "an evaluation")
+    while _evaluated_at(relay) == before:
+        relay.step()
     return [name for name, seen in _evaluated_at(relay).items() if seen != before.get(name)]
 
 
-@pytest.mark.parametrize(("n_groups", "at_a_time", "turns"), [(10, 10, 1), (_GROUPS, 10, 2), (61, 16, 4)])
+@pytest.mark.parametrize(("n_groups", "at_a_time", "turns"), [(10, 10, 1), (12, 10, 2), (61, 16, 4)])
 def test_all_of_a_few_and_some_of_many_are_evaluated_at_a_time_and_none_is_left_out(
     relay_of, n_groups, at_a_time, turns
 ):
-    relay = relay_of(n_groups)
+    relay = relay_of([f"g{n}" for n in range(n_groups)])
     assert len(_evaluated_next(relay)) == n_groups
     evaluated = [_evaluated_next(relay) for _ in range(turns)]
     assert [len(names) for names in evaluated] == [at_a_time] * turns
     assert set().union(*evaluated) == set(_evaluated_at(relay))
 
 
-def test_whoever_asks_for_the_state_sees_all_as_they_are(relay_of, monkeypatch):
-    # However long the next evaluation takes to come.
-    monkeypatch.setattr("syncrelay.relay.relay._ASKED_S", 600.0)
-    relay = relay_of(_GROUPS)
+def test_whoever_asks_for_the_state_sees_all_as_they_are(relay_of):
+    relay = relay_of(_NAMES)
     _evaluated_next(relay)
     assert len(_evaluated_next(relay)) == 10
     relay.state()
-    assert len(_evaluated_next(relay)) == _GROUPS
+    assert _evaluated_next(relay) == _NAMES
 
 
 def test_whoever_plots_them_sees_all_as_they_are(relay_of):
-    relay = relay_of(_GROUPS, diagnostics={"scalars": True})
-    assert [len(_evaluated_next(relay)) for _ in range(3)] == [_GROUPS] * 3
+    relay = relay_of(_NAMES, diagnostics={"scalars": True})
+    assert [_evaluated_next(relay) for _ in range(3)] == [_NAMES] * 3
 
 
-def test_groups_that_a_reload_brings_are_evaluated_at_once(relay_of, tmp_path):
-    relay = relay_of(_GROUPS)
+def test_groups_that_a_reload_brings_are_evaluated_at_once(relay_of):
+    relay = relay_of(_NAMES)
     _evaluated_next(relay)
-    names = [*_evaluated_at(relay), "new"]
-    relay.reload(_loaded(tmp_path, names))
+    relay.reload(_loaded([*_NAMES, "new"]))
     assert "new" in _evaluated_next(relay)
-    assert list(_evaluated_at(relay)) == names
+    assert list(_evaluated_at(relay)) == [*_NAMES, "new"]
 
 
 def test_a_report_stands_until_the_next_one_is_there(relay_of, monkeypatch):
-    relay = relay_of(3)
+    relay = relay_of(["a", "b", "c"])
     _evaluated_next(relay)
     evaluate, there = relay.monitor._evaluate_group, []  # noqa: SLF001  no other moment is within an evaluation
 
@@ -102,7 +96,7 @@ def test_a_report_stands_until_the_next_one_is_there(relay_of, monkeypatch):
 
 
 def test_a_group_that_cannot_be_evaluated_is_named_and_its_last_report_is_gone(relay_of, monkeypatch, caplog):
-    relay = relay_of(2)
+    relay = relay_of(["g0", "g1"])
     _evaluated_next(relay)
     assert relay.state().unjudged == ()
     evaluate = relay.monitor._evaluate_group  # noqa: SLF001  as above
