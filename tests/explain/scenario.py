@@ -146,7 +146,6 @@ def run(
     seed: int = 0,
     options: dict[str, Any] | None = None,
     stops: Sequence[tuple[float, float]] = (),
-    starved: Sequence[tuple[float, float]] = (),
     sleeps: Sequence[tuple[int, int]] = (),
     paused: Sequence[tuple[float, float]] = (),
     publishers: Callable[[str, float], tuple[Endpoint, ...]] | None = None,
@@ -158,9 +157,8 @@ def run(
     """Run a rig for so many seconds, and look at it at each, or at those that are given.
 
     `stops` are when the whole process stands still, as by SIGSTOP, each from one second to another: what comes
-    meanwhile is received at the end, and who looks rests for `rest_s` more, as a rest goes on behind it. `starved` is
-    the same of the thread that takes messages: they are received in time, and lie there. `sleeps` is when nobody
-    listens to a lazy group: it receives nothing. `paused` is when the relay is paused.
+    meanwhile is received at the end, and who looks rests for `rest_s` more, as a rest goes on behind it. `sleeps` is
+    when nobody listens to a lazy group: it receives nothing. `paused` is when the relay is paused.
 
     `publishers` gives what the graph shows of a topic at a second, `facts` more keywords of `GroupWatch.facts`.
     `hears` is called at each look with what the group's log would say, and of what.
@@ -175,17 +173,15 @@ def run(
     waiting = sorted((_until(stops, at), index, stamp) for at, index, stamp in heard)
     for index in (index for index, topic in enumerate(config.topics) if topic.stamp == "receive"):
         waiting = _stamped_by_receipt(waiting, index)
-    taken = sorted((_until(starved, at), at, index, stamp) for at, index, stamp in waiting)
     place = 0
     shown = publishers or (lambda topic, _: tuple(each.endpoint for each in sources if each.topic == topic))
     before = 0.0
     for second in looks or range(1, seconds + 1):
-        # Who polls asks the thread that takes messages, and waits for it.
-        if _until([*((begin, end + rest_s) for begin, end in stops), *starved], float(second)) > second:
+        if _until([(begin, end + rest_s) for begin, end in stops], float(second)) > second:
             continue
-        while place < len(taken) and taken[place][0] <= second:
-            at, received, index, stamp = taken[place]
-            relay.take(index, stamp, _ns(received), now=_ns(at))
+        while place < len(waiting) and waiting[place][0] <= second:
+            at, index, stamp = waiting[place]
+            relay.take(index, stamp, _ns(at))
             place += 1
         stop = next(((begin, end) for begin, end in stops if before <= end + rest_s <= second), None)
         before = second
@@ -276,7 +272,6 @@ class _Relay:
         self._log = FindingLog()
         self._arrived: tuple[list[tuple[int, int]], ...] = tuple([] for _ in config.topics)
         self._sent: list[tuple[tuple[int | None, ...], int]] = []
-        self._waits: list[int] = [0]
         self._standstills: list[Standstill | None] = []
         self.asleep = False
         self.woke: int | None = None
@@ -284,16 +279,15 @@ class _Relay:
         self.found: list[tuple[float, tuple[Finding, ...]]] = []
         self.facts: GroupFacts | None = None
 
-    def take(self, index: int, stamp: int | None, received: int, *, now: int) -> None:
+    def take(self, index: int, stamp: int | None, now: int) -> None:
         """Take one message."""
-        self._waits[-1] = max(self._waits[-1], now - received)
         if stamp is None:
-            self._driver.reject(index, received, now=now)
+            self._driver.reject(index, now, now=now)
             return
         if (clock := self._clocks[index]) is not None:
-            stamp = clock.host_time(stamp, received)
-        self._arrived[index].append((stamp, received))
-        message = Message(index, stamp, received)
+            stamp = clock.host_time(stamp, now)
+        self._arrived[index].append((stamp, now))
+        message = Message(index, stamp, now)
         if self._pause_at(now) is None:
             self._driver.add(message, now=now)
             return
@@ -333,13 +327,10 @@ class _Relay:
             InputGraph(*name, publishers=each, type_from=taken)
             for name, each, taken in zip(self._names, publishers, self._taken, strict=True)
         ]
-        waited = max(self._waits[-10:])
-        self._waits.append(0)
         self.facts = self._watch.facts(
             graph,
             now=now,
             **{
-                "waited": waited,
                 "standstills": [each for each in self._standstills if each],
                 "asleep": self.asleep,
                 "pause": self._pause_at(now),

@@ -40,7 +40,7 @@ def shown(of: Callable[[float], tuple[Endpoint, ...]]) -> dict[str, Any]:
 IMAGES = Endpoint("/stranger", "sensor_msgs/msg/Image")
 UNTYPED = {"topic_options": {"type": None}}
 
-# What is told, the code of its cause, the topics that this is about. The rigs of tests/scenarios are of more causes.
+# What is told, the code of its cause, the topics that this is about. tests/bank draws many more.
 CAUSES: dict[str, tuple[Callable[[], Told], str, tuple[str, ...]]] = {
     "both inputs drift": (
         lambda: run(
