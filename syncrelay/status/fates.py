@@ -34,6 +34,7 @@ _DRAWN: Final = {
     DropReason.UNSTAMPED: ("0", "M-4 0A4 4 0 1 0 4 0A4 4 0 1 0-4 0M-3 3L3-3", False),
     DropReason.MALFORMED: ("?", "M-4-4H4V4H-4Z", True),
     DropReason.THINNED: ("-", "M-4-4H4V4H-4Z", False),
+    DropReason.NO_TRANSFORM: ("/", "M-4 4.5L4-4.5M-4.5-1L0-4.5", False),
     DropReason.PAUSED: (":", "M-2-4.5V4.5M2-4.5V4.5", False),
     DropReason.SHUTDOWN: ("|", "M-4.5 0H4.5M0-4.5V4.5", False),
 }

@@ -14,6 +14,7 @@ from syncrelay.sync.optional import OptionalInputs
 from syncrelay.sync.policy import Policy
 from syncrelay.sync.queues import StampQueue
 from syncrelay.sync.ticks import Ticks
+from syncrelay.sync.transforms import Lack, Lapse, Missing, Transforms
 
 __all__ = [
     "ApproximateEpsilonTime",
@@ -24,10 +25,13 @@ __all__ = [
     "EqualKey",
     "ExactTime",
     "InputCounts",
+    "Lack",
+    "Lapse",
     "LatestAtTicks",
     "LatestTime",
     "Match",
     "Message",
+    "Missing",
     "OptionalInputs",
     "Outcome",
     "Policy",
@@ -35,4 +39,5 @@ __all__ = [
     "StampQueue",
     "SyncGroup",
     "Ticks",
+    "Transforms",
 ]

@@ -9,6 +9,7 @@ from syncrelay.sync.matching import Limited, Prompt
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome, Restamp, T, common_stamp
 from syncrelay.sync.policy import Policy
 from syncrelay.sync.thinning import Thinning
+from syncrelay.sync.transforms import Lapse, Transforms, TransformStage
 
 
 class SyncGroup(Generic[T]):
@@ -25,6 +26,8 @@ class SyncGroup(Generic[T]):
     - Where a clock triggers, `now` is the time of that clock, in nanoseconds since the epoch of the stamps. The set of
       a tick leaves `max_wait_ns` after the tick (0 without it), with the messages that were added before.
     - `restamp` gives the messages of a set a common stamp. `every` and `min_set_period_ns` thin sets.
+    - With `transforms` a set waits, after it was matched, until all of its messages can be transformed at the stamps
+      with which they leave. Call `expire` when more transforms are known.
 
     `add` first lets leave what was due before it, so calling `expire` more often changes nothing.
     """
@@ -40,6 +43,7 @@ class SyncGroup(Generic[T]):
         "_offsets",
         "_required",
         "_restamp",
+        "_stage",
         "_thinning",
     )
 
@@ -53,11 +57,14 @@ class SyncGroup(Generic[T]):
         restamp: Restamp | int | None = None,
         every: int = 1,
         min_set_period_ns: int | None = None,
+        transforms: Transforms | None = None,
+        most_waiting: int = 10,
     ) -> None:
         """Run a policy that has not been fed anything.
 
         `required` (default: all), and `offsets_ns`, which is added to the stamps for matching, have a value for each
-        input. Durations are in nanoseconds. Raises ValueError for what is not so, or cannot be.
+        input. At most `most_waiting` sets wait for transforms. Durations are in nanoseconds. Raises ValueError for what
+        is not so, or cannot be.
         """
         n_inputs = policy.n_inputs
         required = (True,) * n_inputs if required is None else required
@@ -82,7 +89,10 @@ class SyncGroup(Generic[T]):
             self._thinning = Thinning(
                 n_inputs=n_inputs, repeats=policy.repeats, every=every, min_set_period_ns=min_set_period_ns
             )
-        self._is_limited = max_wait_ns is not None or policy.by_clock
+        self._stage = None
+        if transforms is not None:
+            self._stage = TransformStage(transforms, n_inputs=n_inputs, repeats=policy.repeats, most=most_waiting)
+        self._is_limited = max_wait_ns is not None or policy.by_clock or transforms is not None
         self._matching: Prompt | Limited
         if policy.by_clock or max_wait_ns is None:
             self._matching = Prompt(policy, required=required, max_wait_ns=max_wait_ns or 0)
@@ -96,6 +106,11 @@ class SyncGroup(Generic[T]):
     def sets(self) -> int:
         """How many sets have left."""
         return self._ledger.sets
+
+    @property
+    def lapses(self) -> Sequence[Lapse]:
+        """The sets that were given up last because they could not be transformed, oldest first."""
+        return () if self._stage is None else self._stage.lapses
 
     def add(self, message: Message[T], *, now: int) -> Sequence[Outcome[T]]:
         """Take a message that arrives at `now`; return what leaves because of it, in order."""
@@ -121,12 +136,18 @@ class SyncGroup(Generic[T]):
 
     def next_deadline(self) -> int | None:
         """Return the `now` at which `expire` has something to do; None if not before the next message."""
-        return self._matching.next_deadline()
+        deadline = self._matching.next_deadline()
+        if self._stage is None:
+            return deadline
+        return min((each for each in (deadline, self._stage.next_deadline()) if each is not None), default=None)
 
     def expire(self, *, now: int) -> Sequence[Outcome[T]]:
-        """Return what leaves because it has waited long enough."""
+        """Return what leaves because it has waited long enough, or because more transforms are known."""
         outcomes = self._matching.due(now)
-        return self._leave(outcomes, now) if outcomes else outcomes
+        left = self._leave(outcomes, now) if outcomes else outcomes
+        if self._stage is None:
+            return left
+        return [*left, *self._depart(self._stage.release(now), now)]
 
     def pass_over(self, *, now: int) -> None:
         """Let time pass without the sets that a clock would trigger, as nobody wants them."""
@@ -144,7 +165,7 @@ class SyncGroup(Generic[T]):
 
         The latest messages of inputs whose messages can be in many sets stay.
         """
-        drops = self._matching.let_go(reason)
+        drops = [*(self._stage.let_go(reason) if self._stage is not None else ()), *self._matching.let_go(reason)]
         self._ledger.note(drops)
         return drops
 
@@ -152,6 +173,8 @@ class SyncGroup(Generic[T]):
         """Return what became of the messages of each input since the group was made."""
         inputs = range(len(self._offsets))
         buffered = [self._matching.buffered(index) for index in inputs]
+        if self._stage is not None:
+            buffered = [held + self._stage.buffered(index) for index, held in enumerate(buffered)]
         if self._thinning is not None:
             buffered = [held + self._thinning.buffered(index) for index, held in enumerate(buffered)]
         return self._ledger.counts(buffered, [self._matching.needed_queue(index) for index in inputs])
@@ -175,28 +198,34 @@ class SyncGroup(Generic[T]):
         return [*drops, *self._feed(index, stamp + self._offsets[index], message)]
 
     def _empty(self, reason: DropReason) -> list[Drop]:
-        drops = self._matching.flush(reason)
+        drops = [*(self._stage.flush(reason) if self._stage is not None else ()), *self._matching.flush(reason)]
         if self._thinning is not None:
             drops += self._thinning.flush(reason)
         self._ledger.forget()
         return drops
 
     def _leave(self, outcomes: Sequence[Outcome], now: int) -> Sequence[Outcome]:
-        """Note which messages went into sets, also into thinned ones; then thin, restamp and count what leaves."""
+        """Note which messages went into sets, also into those that will not leave; restamp and hold sets."""
         for outcome in outcomes:
             if isinstance(outcome, Match):
                 self._arrivals.give(outcome.messages)
+        if self._restamp is not None:
+            outcomes = [
+                Match(outcome.messages, common_stamp(outcome, self._restamp), outcome.tick)
+                if isinstance(outcome, Match)
+                else outcome
+                for outcome in outcomes
+            ]
+        if self._stage is not None:
+            outcomes = self._stage.take(outcomes, now)
+        return self._depart(outcomes, now)
+
+    def _depart(self, outcomes: Sequence[Outcome], now: int) -> Sequence[Outcome]:
+        """Thin and count what leaves."""
         if self._thinning is not None:
             outcomes = self._thinned(outcomes, self._thinning, now)
         self._ledger.note(outcomes)
-        if self._restamp is None:
-            return outcomes
-        return [
-            Match(outcome.messages, common_stamp(outcome, self._restamp), outcome.tick)
-            if isinstance(outcome, Match)
-            else outcome
-            for outcome in outcomes
-        ]
+        return outcomes
 
     def _thinned(self, outcomes: Sequence[Outcome], thinning: Thinning, now: int) -> list[Outcome]:
         left: list[Outcome] = []

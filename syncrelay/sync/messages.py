@@ -72,6 +72,11 @@ class DropReason(Enum):
     UNSTAMPED = ("unstamped", "its stamp is 0", "Its stamp is zero: the driver does not fill it in.")
     MALFORMED = ("malformed", "no stamp could be read", "No stamp could be read from its bytes.")
     THINNED = ("thinned", "its set was left out", "Its set was left out by `max_rate` or `every`.")
+    NO_TRANSFORM = (
+        "no_transform",
+        "could not be transformed",
+        "Its set could not be transformed to the `target` of `transforms` within `wait`.",
+    )
     PAUSED = ("paused", "the relay was paused", "It was waiting when the relay was paused, or came while it was.")
     SHUTDOWN = (
         "shutdown",
@@ -87,13 +92,15 @@ class DropReason(Enum):
 class Message(Generic[T]):
     """One message of one input: index from 0, stamp in nanoseconds, a payload of type T that the engine never opens.
 
-    `key` is what `equal_key` matches by; the other policies leave it alone.
+    `key` is what `equal_key` matches by; the other policies leave it alone. `frame` is the coordinate frame that sets
+    wait for the transforms of, where a group has any; None needs none.
     """
 
     input: int
     stamp: int
     payload: T
     key: Hashable = None
+    frame: str | None = None
 
 
 @dataclass(slots=True, unsafe_hash=True)

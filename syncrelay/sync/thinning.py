@@ -22,7 +22,7 @@ class Thinning:
             raise ValueError(f"every {every} and min_set_period_ns {min_set_period_ns} must be 1 or more")
         self._every = every
         self._period = min_set_period_ns
-        self._withheld = Withheld(n_inputs) if repeats else None
+        self._withheld = Withheld(n_inputs, DropReason.THINNED) if repeats else None
         self._reset()
 
     def thin(self, match: Match, stamp: int) -> Sequence[Outcome]:
@@ -68,9 +68,11 @@ class Withheld:
     The newest of each input is kept, as it may still be in a set that passes, and is dropped once it cannot be.
     """
 
-    __slots__ = ("_messages", "_passed")
+    __slots__ = ("_messages", "_passed", "_reason")
 
-    def __init__(self, n_inputs: int) -> None:
+    def __init__(self, n_inputs: int, reason: DropReason) -> None:
+        """Take the reason for which messages are dropped that will be in no set."""
+        self._reason = reason
         self._messages: list[Message | None] = [None] * n_inputs
         self._passed: list[int | None] = [None] * n_inputs
 
@@ -81,7 +83,7 @@ class Withheld:
         for index, message in enumerate(match.messages):
             if message is not None:
                 self._passed[index] = message.stamp
-        return _not_in(stopped, match.messages)
+        return self._not_in(stopped, match.messages)
 
     def note_stopped(self, match: Match) -> list[Drop]:
         """Note a set that did not pass; return the drops of messages that will be in no other."""
@@ -90,7 +92,7 @@ class Withheld:
             None if message is None or message.stamp == passed else message
             for message, passed in zip(match.messages, self._passed, strict=True)
         ]
-        return _not_in(stopped, self._messages)
+        return self._not_in(stopped, self._messages)
 
     def flush(self, reason: DropReason) -> list[Drop]:
         """Drop everything, and be as new."""
@@ -103,10 +105,14 @@ class Withheld:
         """Return how many messages of this input are withheld."""
         return int(self._messages[index] is not None)
 
+    def stamp(self, index: int) -> int | None:
+        """Return the stamp of the message of this input that is withheld; None where none is."""
+        message = self._messages[index]
+        return None if message is None else message.stamp
 
-def _not_in(stopped: Sequence[Message | None], messages: Sequence[Message | None]) -> list[Drop]:
-    return [
-        Drop(message, DropReason.THINNED)
-        for message, current in zip(stopped, messages, strict=True)
-        if message is not None and message is not current
-    ]
+    def _not_in(self, stopped: Sequence[Message | None], messages: Sequence[Message | None]) -> list[Drop]:
+        return [
+            Drop(message, self._reason)
+            for message, current in zip(stopped, messages, strict=True)
+            if message is not None and message is not current
+        ]

@@ -1,9 +1,6 @@
 """The engine against the real C++ message_filters, set for set and moment for moment."""
 
-import hashlib
-import os
 import random
-import shutil
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from syncrelay.sync import ApproximateTime, ExactTime, Match, Message, SyncGroup
+from tests.cpp_peers import built
 from tests.faults.extent import chosen
 from tests.sync.support.streams import AGE_PENALTIES, MS, in_order
 
@@ -21,20 +19,13 @@ STREAMS = chosen(short=50, long=2_000)
 
 @pytest.fixture
 def driver(request):
-    if not HEADER.exists():
-        pytest.skip("libmessage-filters-dev is not installed: apt-get install libmessage-filters-dev")
-    compiler = shutil.which("g++")
-    if compiler is None:
-        pytest.skip("no g++ to build the driver of message_filters with")
-    # To compile its templates takes 18 s of CPU: it is kept between runs, by what it was made of.
-    made_of = hashlib.sha256(b"".join(map(Path.read_bytes, (DRIVER, HEADER, HEADER.with_name("exact_time.h")))))
-    binary = request.config.cache.mkdir("peer") / made_of.hexdigest()
-    if not binary.exists():
-        libraries = ("-lmessage_filters", "-lrosconsole", "-lrostime", "-lboost_thread")
-        unfinished = binary.with_suffix(f".{os.getpid()}")
-        subprocess.run([str(compiler), "-std=c++17", "-w", DRIVER, "-o", unfinished, *libraries], check=True)
-        unfinished.replace(binary)
-    return binary
+    return built(
+        request,
+        DRIVER,
+        package="libmessage-filters-dev",
+        headers=(HEADER, HEADER.with_name("exact_time.h")),
+        libraries=("message_filters", "rosconsole", "rostime", "boost_thread"),
+    )
 
 
 @dataclass(frozen=True)
