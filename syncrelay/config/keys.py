@@ -17,6 +17,7 @@ from syncrelay.config.listen import check_listen, parse_host
 from syncrelay.config.names import (
     LONGEST_TOPIC,
     check_field_path,
+    check_frame,
     check_namespace,
     check_node_name,
     check_output_prefix,
@@ -108,6 +109,21 @@ ShortDuration = Annotated[
 ]
 """A duration of 0 to 0.1 s, in nanoseconds."""
 
+_LONGEST_WAIT_NS: Final = 10_000_000_000
+
+
+def _kept_by_tf2(value: object) -> int:
+    wait = not_negative(value)
+    if wait > _LONGEST_WAIT_NS:
+        raise ValueError("at most 10s: tf2 keeps transforms no longer")
+    return wait
+
+
+TransformWait = Annotated[
+    int, BeforeValidator(_kept_by_tf2), WithJsonSchema(duration_schema(sign=r"\+?", minimum=0, maximum=10))
+]
+"""A duration of 0 to 10 s, in nanoseconds."""
+
 SignedDuration = Annotated[int, BeforeValidator(parse_duration), WithJsonSchema(duration_schema(sign="[+-]?"))]
 """A duration of either sign, in nanoseconds."""
 
@@ -156,6 +172,9 @@ Namespace = Annotated[str, AfterValidator(check_namespace), _text(rf"^(/|/?{_TOK
 
 TypeName = Annotated[str, BeforeValidator(check_type_name), _text("^[A-Za-z][A-Za-z0-9_]*/msg/[A-Za-z][A-Za-z0-9_]*$")]
 """A message type in full, `package/msg/Name`."""
+
+FrameName = Annotated[str, AfterValidator(check_frame), _text("^[^/]")]
+"""A coordinate frame, as tf2 looks it up."""
 
 FieldPath = Annotated[str, AfterValidator(check_field_path), _text(r"^[A-Za-z]\w*(\.[A-Za-z]\w*)*$")]
 """Fields of a message joined by dots."""

@@ -12,11 +12,13 @@ from syncrelay.config.keys import (
     NOT_NULL,
     Duration,
     FieldPath,
+    FrameName,
     Keys,
     OutputPrefix,
     Rate,
     SignedDuration,
     TopicName,
+    TransformWait,
     TypeName,
     tag_of_mapping,
 )
@@ -36,6 +38,25 @@ class StampField(Keys):
 
 
 StampSource: TypeAlias = Literal["header", "receive"] | StampField
+
+
+class TransformsConfig(Keys):
+    """Which transforms a set waits for."""
+
+    target: FrameName = Field(
+        description="The frame to which all messages of a set can be transformed when it leaves.",
+        examples=["base_link"],
+    )
+    wait: TransformWait = Field(
+        default=100_000_000,
+        description=(
+            "How long a set may wait for transforms, once it is matched; then it is dropped as `no_transform`. At most"
+            " 10s, as tf2 keeps transforms no longer. A number is seconds, a string has a unit (ns, us, ms, s, min)."
+            " Default: 100ms."
+        ),
+        examples=["250ms"],
+        json_schema_extra={"default": "100ms"},
+    )
 
 
 class Topic(Keys):
@@ -279,6 +300,15 @@ class Group(Keys):
             " trigger's message, or the time of the clock's tick. Default: none."
         ),
         examples=["none", "earliest", "latest", "trigger", "/lidar/points"],
+    )
+    transforms: Annotated[TransformsConfig | None, NOT_NULL] = Field(
+        default=None,
+        description=(
+            "Let a set leave only once tf2 can transform each of its messages from the frame_id of its header to this"
+            " `target`, at the stamp with which it leaves. Up to `queue_size` sets wait for that. Messages without a"
+            " header need no transform. Default: sets leave without."
+        ),
+        examples=[{"target": "base_link", "wait": "100ms"}],
     )
     lazy: bool = Field(
         default=False,

@@ -140,6 +140,17 @@ def check_type_name(name: object) -> str:
     raise ValueError(f"{quoted(name)} is not a message type, expected package/msg/Name such as sensor_msgs/msg/Image")
 
 
+def check_frame(frame: str) -> str:
+    """Return a coordinate frame if tf2 can look it up; raises ValueError saying what is wrong."""
+    if not frame:
+        raise ValueError("a frame's name is empty")
+    if frame.startswith("/"):
+        raise ValueError(
+            f"tf2 looks up no frame that begins with `/`: write {quoted(frame.lstrip('/') or 'base_link')}"
+        )
+    return frame
+
+
 def check_field_path(path: str) -> str:
     """Return a path of fields if it has the form of one; raises ValueError saying what is wrong."""
     if not _PATH.fullmatch(path):

@@ -11,7 +11,8 @@ from syncrelay.config.names import default_output
 from syncrelay.config.problems import Path
 from syncrelay.config.qos import QosOverrides, QosPreset
 from syncrelay.config.sections import MetricsConfig, NodeConfig
-from syncrelay.sync import Restamp, SyncGroup, Ticks
+from syncrelay.sync import Restamp, SyncGroup, Ticks, Transforms
+from syncrelay.sync.transforms import Chains
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +76,8 @@ class GroupConfig:
     @property
     def has_deadlines(self) -> bool:
         """Whether sets may leave as time passes; if not, `expire` never returns anything."""
-        return self.options.max_wait is not None or self.ticks is not None
+        options = self.options
+        return options.max_wait is not None or self.ticks is not None or options.transforms is not None
 
     @property
     def held(self) -> tuple[int, ...]:
@@ -92,8 +94,9 @@ class GroupConfig:
         for index, topic in enumerate(self.topics):
             yield (*self.path, "topics", index), topic
 
-    def engine(self) -> SyncGroup:
-        """Return a new, empty engine of this group."""
+    def engine(self, chains: Chains | None = None) -> SyncGroup:
+        """Return a new, empty engine of this group. Without `chains`, no set waits for transforms."""
+        awaited = self.options.transforms
         return SyncGroup(
             self.options.build_policy(self.inputs),
             required=tuple(topic.required for topic in self.topics),
@@ -102,6 +105,8 @@ class GroupConfig:
             restamp=self.restamp,
             every=self.options.every,
             min_set_period_ns=self.options.max_rate,
+            transforms=Transforms(chains, awaited.target, awaited.wait) if awaited and chains is not None else None,
+            most_waiting=self.options.queue_size,
         )
 
 

@@ -10,6 +10,7 @@ from syncrelay.config.models import StampField
 from syncrelay.config.problems import Path, Problem, Severity
 from syncrelay.config.resolved import GroupConfig, TopicConfig
 from syncrelay.config.wording import one_of, or_nearest, quoted
+from syncrelay.frames import TF_TYPE
 
 
 class Wanted(NamedTuple):
@@ -35,6 +36,9 @@ class _WantedField(NamedTuple):
     wanted: Wanted
 
 
+TF_INSTALL: Final = "`apt-get install ros-jazzy-tf2-msgs`, or with ROS from PyPI see docs/howto/transforms.md"
+"""What to do where the type of /tf is not installed."""
+
 _A_TIME: Final = Wanted(frozenset([TIME]), TIME)
 _A_KEY: Final = Wanted(PRIMITIVES - {"wstring"} | {TIME}, "a number, a string or a time")
 
@@ -54,6 +58,7 @@ class TypeChecks:
                     yield from self._topic(group, topic, topic.type, path)
             yield from self._kinds_of_keys(group)
             yield from self._restamp(group)
+            yield from self._transforms(group)
 
     def of_field(self, type_name: str, path: Path, steps: str, wanted: Wanted) -> Iterator[Problem]:
         """Yield what is wrong with the field that the file names at `path`; nothing of a type without its .msg file."""
@@ -143,6 +148,14 @@ class TypeChecks:
             return
         text = "no type of this group begins with a std_msgs/msg/Header, so there is no stamp to set"
         yield self.document.problem((*group.path, "restamp"), text, code="no_header")
+
+    def _transforms(self, group: GroupConfig) -> Iterator[Problem]:
+        path = (*group.path, "transforms")
+        if group.options.transforms is not None and not self._is_installed(TF_TYPE):
+            text = f"{TF_TYPE} is not installed here, or not sourced, and the relay needs it for this: {TF_INSTALL}"
+            yield self.document.problem(
+                path, text, code="package_missing", severity=Severity.NOTE, subject=TF_TYPE.partition("/")[0]
+            )
 
     def _asked_fields(self, topic: TopicConfig, path: Path) -> Iterator[_WantedField]:
         """Yield the fields of its messages that the file names for a topic."""

@@ -9,6 +9,7 @@ import pytest
 from syncrelay.config import Config, load_text
 from syncrelay.config.file import file_format
 from syncrelay.explain.dry_run import EngineDriver
+from syncrelay.frames import Edge, Frames
 from syncrelay.sync import Match, Message, Outcome
 from tests.drawn_files import models_of
 
@@ -66,6 +67,22 @@ def sets_after(wait_ms: int, *arrivals: tuple[int, int]) -> Callable[[Config], o
         engine = config.groups[0].engine()
         for index, stamp in arrivals:
             engine.add(Message(index, stamp * MS, None), now=0)
+        engine.expire(now=wait_ms * MS)
+        return engine.sets
+
+    return sets
+
+
+def sets_with_transforms(wait_ms: int) -> Callable[[Config], object]:
+    """How many sets have left some time after they were matched, when the transform from `arm` to `base` came."""
+
+    def sets(config: Config) -> object:
+        frames = Frames()
+        engine = config.groups[0].engine(frames)
+        for index in (0, 1):
+            engine.add(Message(index, 100 * MS, None, frame="arm"), now=0)
+        engine.expire(now=(wait_ms - 1) * MS)
+        frames.add(Edge("base", "arm", 0, is_static=True))
         engine.expire(now=wait_ms * MS)
         return engine.sets
 
@@ -157,6 +174,11 @@ OPTIONS: dict[str, Row] = {
     "type": of_topic(of_first_topic("type"), type="sensor_msgs/msg/Imu"),
     "output": of_topic(outputs, output="/z"),
     "output_prefix": of_group(outputs, output_prefix="/z"),
+    "transforms": of_group(sets_with_transforms(150), EXACT, transforms={"target": "base"}),
+    "target": of_group(sets_with_transforms(50), EXACT, transforms=({"target": "base"}, {"target": "map"})),
+    "wait": of_group(
+        sets_with_transforms(150), EXACT, transforms=({"target": "base"}, {"target": "base", "wait": "200ms"})
+    ),
     "lazy": of_group(lambda config: config.groups[0].options.lazy, lazy=True),
     "manifest": of_group(own_topics, manifest=False),
     "qos": of_topic(of_first_topic("qos"), qos="sensor_data"),
