@@ -1,4 +1,4 @@
-"""Builds message packages into the image's Python environment, beside those of the ROS wheels. Run by its Python.
+"""Builds message packages into the Python environment that runs this, beside those of the ROS wheels.
 
 usage: build_messages.py FOLDER...
 
@@ -114,16 +114,16 @@ def _link(generated: Path, sources: Iterable[Path], library: Path, needed: Seque
 
 def _install(name: str, folder: Path, messages: Sequence[Path], generated: Path) -> None:
     package, share = _PACKAGES / name, _PREFIX / "share" / name
-    (package / "msg").mkdir(parents=True)
+    (package / "msg").mkdir(parents=True, exist_ok=True)
     (package / "__init__.py").touch()
     for file in generated.glob("msg/*.py"):
         shutil.copy(file, package / "msg")
     shutil.copy(generated / f"{name}_s__rosidl_typesupport_c.so", package)
-    shutil.copytree(generated / "msg", share / "msg", ignore=_all_but(".idl", ".json"))
+    shutil.copytree(generated / "msg", share / "msg", ignore=_all_but(".idl", ".json"), dirs_exist_ok=True)
     for file in (*messages, Path("package.xml")):
         shutil.copy(folder / file, share / file)
     headers = _PREFIX / "include" / name / name / "msg"
-    shutil.copytree(generated / "msg", headers, ignore=_all_but(".h", "detail"))
+    shutil.copytree(generated / "msg", headers, ignore=_all_but(".h", "detail"), dirs_exist_ok=True)
     listed = sorted(str(file) for message in messages for file in (message, message.with_suffix(".idl")))
     (_INDEX / "rosidl_interfaces" / name).write_text("\n".join(listed))
     (_INDEX / "packages" / name).touch()

@@ -132,7 +132,9 @@ class Flow:
 
         return deliver
 
-    def receive(self, index: int, payload: Payload, stamp: int | None, key: Hashable = None) -> None:
+    def receive(
+        self, index: int, payload: Payload, stamp: int | None, key: Hashable = None, frame: str | None = None
+    ) -> None:
         """Take in a message of one input, whose stamp, in nanoseconds, is None where it or the key cannot be read."""
         if stamp is None:
             self.conclude([self.engine.reject(Message(index, 0, payload), DropReason.MALFORMED)])
@@ -140,7 +142,7 @@ class Flow:
         self._watched.arrivals[index].append((stamp, payload.received))
         if key is not None:
             self.keys[index] = key
-        outcomes = self.engine.add(Message(index, stamp, payload, key), now=self._now())
+        outcomes = self.engine.add(Message(index, stamp, payload, key, frame), now=self._now())
         if outcomes:
             self.conclude(outcomes)
 

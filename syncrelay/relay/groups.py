@@ -16,6 +16,7 @@ from syncrelay.relay.bindings import GroupBindings
 from syncrelay.relay.clock import WaitingClock
 from syncrelay.relay.manifests import Manifests
 from syncrelay.relay.ports import Node
+from syncrelay.relay.transforms import TransformListener
 from syncrelay.runtime import Runtime
 from syncrelay.sync import DropReason
 
@@ -37,6 +38,7 @@ class Groups:
         bindings: GroupBindings,
         manifests: Manifests,
         loop: ReceiveLoop,
+        transforms: TransformListener,
         clock: WaitingClock,
         runtime: Runtime,
         flow: type[Flow],
@@ -57,6 +59,7 @@ class Groups:
         self._names = chosen
         self._node = node
         self._loop = loop
+        self._transforms = transforms
         self._clock = clock
         self._runtime = runtime
         self._flow = flow
@@ -115,6 +118,8 @@ class Groups:
         Reliable subscribers have so many nanoseconds to get what was published last.
         """
         self.bindings.hold()
+        self._transforms.serve(())
+        self._transforms.poll()
         self._loop.call(lambda: self.flush(DropReason.SHUTDOWN)).result()
         self.wait_until_acknowledged(patience_ns=patience_ns)
         self.bindings.end_publishers()
@@ -134,6 +139,7 @@ class Groups:
     def forget(self) -> None:
         """Run no groups."""
         self.bindings.run(())
+        self._transforms.serve(())
         self.manifests.end_others(())
         self._loop.deadline = None
         self._changed(self.config)
@@ -145,6 +151,7 @@ class Groups:
 
     def _run(self, config: Config) -> Exchange:
         running = {group.config.name: group for group in self.bindings.groups}
+        self._transforms.serve(() if self.bindings.is_held else _chosen(config, self._names))
         stopped = [name for name, group in running.items() if group.failure is not None]
         chosen = _chosen(config, self._names)
         changed = exchange([group.config for group in running.values()], chosen, stopped=stopped)
@@ -172,6 +179,8 @@ class Groups:
     def _begun(self, config: GroupConfig) -> GroupRelay:
         now = self._clock.now if config.ticks is None else self._clock.stamping
         group = GroupRelay(config, now=now, flow=self._flow, tape=self._tape, runtime=self._runtime)
+        if config.options.transforms is not None:
+            group.engine = config.engine(self._transforms.frames)
         if self.is_paused:
             group.pause()
         return group
@@ -222,6 +231,13 @@ class Groups:
         for group in self.bindings.groups:
             group.expire(now if group.config.ticks is None else self._clock.stamping())
 
+    def transforms_came(self) -> None:
+        """Have sets leave that waited for transforms. On the loop's thread."""
+        now = self._clock.now()
+        for group in self.bindings.groups:
+            if group.config.options.transforms is not None:
+                group.expire(now if group.config.ticks is None else self._clock.stamping())
+
     def _next_deadline(self, groups: Sequence[GroupRelay]) -> int | None:
         """Return when the first of these wants `expire` to be called, by the clock that messages wait by."""
         try:
@@ -250,6 +266,7 @@ class Groups:
         # A recording that is played in a loop does this each time.
         _LOG.info("the clock jumped back, as in a looped recording; buffered messages were dropped as time_jump")
         self.flush(DropReason.TIME_JUMP)
+        self._transforms.frames.clear()
 
     def clock_ticked(self) -> None:
         """Expire what is due by the clock. On any thread."""

@@ -9,6 +9,7 @@ from syncrelay.dataflow.backend import Deliver, Outlet, Payload, RclBackend, Sou
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.errors import TypeImportError
 from syncrelay.explain import Refusal
+from syncrelay.frames import read_frame
 from syncrelay.relay.entities import Entities, RefusedError
 from syncrelay.relay.ports import Publisher, Purpose
 from syncrelay.relay.types import begins_with_header, stamp_reader, value_reader
@@ -156,7 +157,10 @@ def handler(group: GroupRelay, index: int, message_type: Any) -> Deliver:
     topic = group.config.topics[index]
     read = stamp_reader(topic.stamp, message_type)
     clock = group.clocks[index]
-    if read is read_stamp and topic.key is None and clock is None:
+    read_its_frame = None
+    if group.config.options.transforms is not None and begins_with_header(message_type):
+        read_its_frame = read_frame
+    if read is read_stamp and topic.key is None and clock is None and read_its_frame is None:
         return group.flow.by_header(index, group.fail)
     read_key = None if topic.key is None else value_reader(message_type, topic.key)
     has_place = None
@@ -173,7 +177,7 @@ def handler(group: GroupRelay, index: int, message_type: Any) -> Deliver:
                 stamp = None
             elif clock is not None and stamp is not None:
                 stamp = clock.host_time(stamp, payload.received)
-            group.flow.receive(index, payload, stamp, key)
+            group.flow.receive(index, payload, stamp, key, read_its_frame(content) if read_its_frame else None)
         except Exception as error:  # noqa: BLE001  it stops the group alone
             group.fail(error)
 

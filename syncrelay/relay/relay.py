@@ -27,6 +27,7 @@ from syncrelay.relay.ports import Node, Outcome, Purpose
 from syncrelay.relay.services import Offered, Services
 from syncrelay.relay.surroundings import Surroundings
 from syncrelay.relay.threads import Threads
+from syncrelay.relay.transforms import TransformListener, require_type
 from syncrelay.runtime import SYSTEM, Runtime
 from syncrelay.status import Phase, RelayState, Taps, advice
 from syncrelay.sync import DropReason
@@ -81,12 +82,14 @@ class Relay:
         `config_paths` are the files' names for `state` and a parameter. `on_turn` is called on the receive thread at
         least once a second, for as long as that works. With `manage` the node is a managed one, which starts without
         groups; it returns what carries out its transitions. Raises ConfigError where remaps give two topics one name,
-        UsageError where ROS rejects what they make of one.
+        UsageError where ROS rejects what they make of one, TypeImportError where groups need transforms and the type of
+        /tf is not installed.
         """
         self.node = node
         self._runtime = runtime
         try:
             require_distinct_names(config, groups, node.resolve_topic)
+            require_type(each for each in config.groups if groups is None or each.name in groups)
         except SyncRelayError:
             node.leave()
             raise
@@ -120,6 +123,13 @@ class Relay:
         self._manifest_queue = manifests.queue
         self.taps = Taps(Tape(runtime=runtime), node.resolve_topic, runtime=runtime)
         """The clients that follow what leaves."""
+        self._transforms = TransformListener(
+            entities=entities,
+            backend=backend,
+            loop=self._loop,
+            came=lambda: self._groups.transforms_came(),  # noqa: PLW0108  the groups come after it
+            runtime=runtime,
+        )
         self._groups = Groups(
             config,
             chosen=groups,
@@ -127,6 +137,7 @@ class Relay:
             bindings=bindings,
             manifests=manifests,
             loop=self._loop,
+            transforms=self._transforms,
             clock=self._clock,
             runtime=runtime,
             flow=backend.flow,
@@ -308,6 +319,8 @@ class Relay:
         has_changed = self._graph_changes.seen()
         with self._bugs.contained("counting subscribers"):
             self._groups.count_listeners()
+        with self._bugs.contained("subscribing to transforms"):
+            self._transforms.poll()
         for topic in self._groups.bindings.topics:
             if has_changed or topic.is_due:
                 with self._bugs.contained(f"polling {topic.name}"):

@@ -1,12 +1,13 @@
 """What ROS refuses as the relay starts, and what remaps make impossible: a sentence, an exit code, no traceback."""
 
 import random
+import sys
 from collections.abc import Iterator
 
 import pytest
 
 from syncrelay.config import ConfigError, load_text
-from syncrelay.errors import UsageError
+from syncrelay.errors import TypeImportError, UsageError
 from tests.cli.command import GOOD, run
 from tests.ros.processes import ros_environment
 
@@ -138,3 +139,12 @@ def test_a_reload_that_remaps_turn_into_a_loop_is_refused_and_the_running_file_k
 
 def names_of(reports):
     return [(each.name, each.output) for report in reports for each in report.facts.inputs]
+
+
+def test_a_file_with_transforms_is_refused_where_the_type_of_tf_is_not_installed(monkeypatch):
+    monkeypatch.setitem(sys.modules, "tf2_msgs", None)
+    file = GOOD.replace("policy:", "transforms: {target: base_link}\n    policy:", 1)
+    with pytest.raises(TypeImportError) as refused:
+        own_relay(load_text(file))
+    assert "tf2_msgs/msg/TFMessage cannot be imported" in str(refused.value)
+    assert "`apt-get install ros-jazzy-tf2-msgs`" in str(refused.value)

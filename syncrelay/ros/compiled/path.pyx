@@ -831,7 +831,7 @@ cdef class Deliver:
         cdef int64_t stamp
         try:
             if read_stamp(payload.message.buffer, payload.message.length, &stamp):
-                self.flow.feed(self.index, payload, stamp, None)
+                self.flow.feed(self.index, payload, stamp, None, None)
             else:
                 self.flow.reject(self.index, payload)
         except Exception as error:
@@ -878,23 +878,23 @@ cdef class Flow:
         deliver.flow, deliver.index, deliver.fail = self, index, fail
         return deliver
 
-    def receive(self, Py_ssize_t index, payload, stamp, key=None):
+    def receive(self, Py_ssize_t index, payload, stamp, key=None, frame=None):
         """Take in a message of one input, whose stamp, in nanoseconds, is None where it or the key cannot be read."""
         if stamp is None:
             self.reject(index, payload)
         else:
-            self.feed(index, payload, stamp, key)
+            self.feed(index, payload, stamp, key, frame)
 
     cdef int reject(self, Py_ssize_t index, object payload) except -1:
         self.conclude((self.engine.reject(Message(index, 0, payload), DropReason.MALFORMED),))
         return 0
 
-    cdef int feed(self, Py_ssize_t index, object payload, object stamp, object key) except -1:
+    cdef int feed(self, Py_ssize_t index, object payload, object stamp, object key, object frame) except -1:
         cdef object now = sr_clock(CLOCK_MONOTONIC) if self._now is None else self._now()
         self._note_arrival[index]((stamp, payload.received))
         if key is not None:
             self.keys[index] = key
-        outcomes = self.engine.add(Message(index, stamp, payload, key), now=now)
+        outcomes = self.engine.add(Message(index, stamp, payload, key, frame), now=now)
         if outcomes:
             self.conclude(outcomes)
         return 0
