@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Final, Protocol, TypeAlias
 
 from syncrelay.config import GroupConfig
+from syncrelay.frames import Edge, Frames
 from syncrelay.sync import DropReason, Message, Outcome
 
 Take: TypeAlias = Callable[[Sequence[Outcome], int], None]
@@ -22,9 +23,18 @@ class _Add(Protocol):
 class EngineDriver:
     """Drives an engine of its own through one group's messages; times of receipt are the only clock."""
 
-    def __init__(self, group: GroupConfig, take: Take | None) -> None:
-        """Take None where nobody is to be told."""
-        self.engine: Final = group.engine()
+    def __init__(
+        self, group: GroupConfig, take: Take | None, transforms: Iterable[tuple[int, Edge]] | None = None
+    ) -> None:
+        """Take None where nobody is to be told.
+
+        `transforms` are those that come, each with its time of receipt; more come by `learn`. With None, no set waits
+        for any.
+        """
+        self._frames = Frames()
+        self.engine: Final = group.engine(None if transforms is None else self._frames)
+        self._transforms = iter(() if transforms is None or group.options.transforms is None else transforms)
+        self._coming = next(self._transforms, None)
         # Else nothing is ever due, and asking for each message costs a tenth of a replay.
         self.has_deadlines: Final = group.has_deadlines
         # Ticks go on for a while after the last message: those of the time after it are nobody's.
@@ -35,7 +45,7 @@ class EngineDriver:
         self.add: Final[_Add] = self._add if take is not None or self.has_deadlines else self.engine.add
 
     def _add(self, message: Message, *, now: int) -> None:
-        if self._due is not None:
+        if self._due is not None or self._coming is not None:
             self.expire(now)
         outcomes = self.engine.add(message, now=now)
         if self.has_deadlines:
@@ -66,18 +76,36 @@ class EngineDriver:
         self.finish(now)
 
     def expire(self, now: int) -> None:
-        """Let what has waited long enough leave, each at its own time, up to `now`."""
+        """Let what has waited long enough leave, each at its own time, up to `now`; learn what came till then."""
+        while self._coming is not None and self._coming[0] <= now:
+            received, edge = self._coming
+            self._coming = next(self._transforms, None)
+            self.learn([edge], now=received)
+        self._expire_due(now)
+
+    def _expire_due(self, now: int) -> None:
         while self._due is not None and self._due <= now:
             due = self._due
             outcomes = self.engine.expire(now=due)
             self._due = self.engine.next_deadline()
             self._take(outcomes, due)
 
+    def learn(self, edges: Sequence[Edge], *, now: int) -> None:
+        """Take transforms that are received; sets leave that waited for them."""
+        self._expire_due(now)
+        for edge in edges:
+            self._frames.add(edge)
+        self._take(self.engine.expire(now=now), now)
+        self._due = self.engine.next_deadline()
+
     def finish(self, now: int) -> None:
         """Let all leave that may: what still waits has a deadline, or will never have a partner.
 
         Of the ticks of a clock, those up to `now` do.
         """
+        while self._coming is not None:
+            now = max(now, self._coming[0])
+            self.expire(now)
         last = None if self._last_wait is None else now + self._last_wait
         while (deadline := self.engine.next_deadline()) is not None and (last is None or deadline <= last):
             self._take(self.engine.expire(now=deadline), deadline)

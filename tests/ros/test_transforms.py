@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.ros.cdr_messages import STORE, VECTOR, header, serialize, stamps_of, vector
+from tests.ros.cdr_messages import VECTOR, stamps_of, vector
 from tests.ros.configs import LOSSLESS, config, inputs
 from tests.ros.frames import Frame
 from tests.ros.processes import Process
@@ -17,31 +17,20 @@ from tests.ros.relaying import play_until_out
 from tests.ros.stage import Collector, Player, Stage, both_backends
 from tests.ros.streams import BEGIN, MS
 from tests.ros.summary import read_summary
+from tests.ros.transforms import TF, transforms
 
 pytestmark = [
     pytest.mark.ros,
     pytest.mark.skipif(find_spec("tf2_msgs") is None, reason="tf2_msgs is not built here: it takes g++"),
 ]
 
-TF = "tf2_msgs/msg/TFMessage"
 _INPUTS = {"/a": VECTOR, "/b": VECTOR}
 _OUTPUTS = {f"/front{topic}": VECTOR for topic in _INPUTS}
 _PERIOD = 100 * MS
 
 
-def _transforms(topic: str, *edges: tuple[str, str, int]) -> Frame:
-    """A message of transforms, each by parent, child and stamp."""
-    types = STORE.types
-    numbers = types["geometry_msgs/msg/Transform"](
-        types["geometry_msgs/msg/Vector3"](1.0, 2.0, 3.0), types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
-    )
-    stamped = types["geometry_msgs/msg/TransformStamped"]
-    found = [stamped(header(stamp, parent), child, numbers) for parent, child, stamp in edges]
-    return Frame(topic, TF, 0, serialize(TF, found))
-
-
 def _moved(stamp: int) -> Frame:
-    return _transforms("/tf", ("odom", "base_link", stamp))
+    return transforms("/tf", ("odom", "base_link", stamp))
 
 
 def _pair(stamp: int, *, frame: str = "camera") -> list[Frame]:
@@ -52,18 +41,18 @@ def _pair(stamp: int, *, frame: str = "camera") -> list[Frame]:
     ]
 
 
-def _group(**transforms: Any) -> dict[str, Any]:
-    awaited = {"target": "odom", **transforms}
-    return {"policy": "exact_time", "queue_size": 100, "transforms": awaited, "topics": inputs(_INPUTS, qos=LOSSLESS)}
+def _group(**awaited: Any) -> dict[str, Any]:
+    keys = {"target": "odom", **awaited}
+    return {"policy": "exact_time", "queue_size": 100, "transforms": keys, "topics": inputs(_INPUTS, qos=LOSSLESS)}
 
 
 @contextmanager
-def _running(stage: Stage, **transforms: Any) -> Iterator[tuple[Process, Player, Collector]]:
+def _running(stage: Stage, **awaited: Any) -> Iterator[tuple[Process, Player, Collector]]:
     """A relay that knows the static transform and has let a first set leave."""
-    relay = stage.relay(config({"front": _group(**transforms)}))
+    relay = stage.relay(config({"front": _group(**awaited)}))
     static = stage.player({"/tf_static": TF}, node="static", durability="transient_local")
     static.match()
-    static.play([_transforms("/tf_static", ("base_link", "camera", 0))])
+    static.play([transforms("/tf_static", ("base_link", "camera", 0))])
     player, collector = stage.player({**_INPUTS, "/tf": TF}), stage.collector(_OUTPUTS)
     times = itertools.count(BEGIN - 1000 * _PERIOD, _PERIOD)
     sets = ([_moved(stamp - MS), _moved(stamp + MS), *_pair(stamp)] for stamp in times)

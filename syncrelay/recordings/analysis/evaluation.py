@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from syncrelay.config import GroupConfig
 from syncrelay.explain import EngineDriver
-from syncrelay.recordings.analysis.streams import Stream, messages
+from syncrelay.recordings.analysis.streams import Stream, messages, transforms_beside
 from syncrelay.sync import DropReason, InputCounts, Match, Outcome
 
 
@@ -65,6 +65,6 @@ class Outcomes:
 def evaluate(group: GroupConfig, streams: Sequence[Stream]) -> Evaluation:
     """Return what a group makes of the streams of its inputs."""
     outcomes = Outcomes(group)
-    driver = EngineDriver(group, outcomes.take)
+    driver = EngineDriver(group, outcomes.take, transforms_beside(streams))
     driver.run(messages(streams))
     return Evaluation(driver.engine.counts(), tuple(outcomes.sets), tuple(outcomes.drops))

@@ -4,7 +4,7 @@ from array import array
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import repeat
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
@@ -21,9 +21,17 @@ from syncrelay.recordings.bag.columns import (
     column_reader,
     in_order,
     keys_in_order,
+    receipt_column,
     stamp_or_receipt_column,
 )
 from syncrelay.recordings.bag.recording import Channel, Encoding, Recording
+from syncrelay.recordings.bag.transforms import (
+    ReadFrame,
+    RecordedTransforms,
+    TransformReader,
+    frame_reader,
+    transform_channels,
+)
 from syncrelay.sync import Message
 
 # So many messages of a group are made at a time.
@@ -58,8 +66,12 @@ class Stream:
     places: "array[int]" = field(default_factory=lambda: array("q"))
     keys: list[Hashable] | None = None
     mapping: Mapping | None = None
+    frames: list[str | None] | None = None
+    """The frames of its messages, and the transforms of the recording, for a group that waits for them."""
+    transforms: RecordedTransforms | None = None
     mapped: dict[int, "Stream"] = field(default_factory=dict)
     """What by_device gave, by the delay: to map takes as long as to match."""
+    _read_frame: ReadFrame = field(default_factory=frame_reader)
 
     def by_device(self, delay_ns: int) -> "Stream":
         """Give the same messages with their stamps mapped to the host's time, as `clock: device` has it."""
@@ -82,7 +94,7 @@ class Stream:
 
     def by_receipt(self) -> "Stream":
         """Give the same messages with the times of receipt for stamps."""
-        return Stream(self.topic, self.type, self.received, self.received, self.places, self.keys)
+        return replace(self, stamps=self.received, mapping=None, mapped={})
 
     def numbers(self) -> tuple[Nanoseconds, Nanoseconds, Nanoseconds]:
         """Give stamps, times of receipt and places as arrays for arithmetic."""
@@ -95,9 +107,11 @@ class Stream:
         self.places.frombytes((column.places + begin).tobytes())
         if self.keys is not None:
             self.keys += column.keys or repeat(None, len(column.places))
+        if self.frames is not None:
+            self.frames += map(self._read_frame, map(batch.rows.__getitem__, column.places.tolist()))
 
 
-_Wanted: TypeAlias = tuple[str, StampSource, str | None, bool]
+_Wanted: TypeAlias = tuple[str, StampSource, str | None, bool, bool]
 _Filled: TypeAlias = list[tuple[Stream, list[tuple[Channel, ReadColumn]]]]
 
 
@@ -109,19 +123,23 @@ def read_streams(recording: Recording, bindings: Sequence[GroupBinding]) -> tupl
     streams: dict[_Wanted, Stream] = {}
     filled: _Filled = []
     chosen: list[list[Stream]] = []
+    transforms = RecordedTransforms()
     for binding in bindings:
         of_group = []
+        awaits = binding.group.options.transforms is not None
         for index, each in enumerate(binding.inputs):
             topic = each.config
             needs_place = binding.group.restamp is not None and topic.stamp != "header"
-            wanted = (each.topic, topic.stamp, topic.key, needs_place)
+            wanted = (each.topic, topic.stamp, topic.key, needs_place, awaits)
             if wanted not in streams:
                 streams[wanted] = Stream(each.topic, topic.type or "", keys=None if topic.key is None else [])
+                if awaits:
+                    streams[wanted].frames, streams[wanted].transforms = [], transforms
                 readers = [(channel, column_reader(binding.group, index, channel)) for channel in each.channels]
                 filled.append((streams[wanted], readers))
             of_group.append(streams[wanted])
         chosen.append(of_group)
-    _pour(recording, filled)
+    _pour(recording, filled, transforms if any(stream.frames is not None for stream in streams.values()) else None)
     return tuple(
         tuple(
             stream.by_device(topic.delay_ns) if topic.is_of_device else stream
@@ -154,9 +172,17 @@ def messages(streams: Sequence[Stream]) -> Iterator[Message]:
     order, inputs = in_order(places)
     stamps, received = (np.concatenate([each[column] for each in numbers])[order] for column in (0, 1))
     keys = iter(keys_in_order([(stream.keys, len(stream.places)) for stream in streams], order) or repeat(None))
+    frames: Iterator[Any] = iter(
+        keys_in_order([(stream.frames, len(stream.places)) for stream in streams], order) or repeat(None)
+    )
     for begin in range(0, len(order), _AT_ONCE):
         among = slice(begin, begin + _AT_ONCE)
-        yield from map(Message, inputs[among].tolist(), stamps[among].tolist(), received[among].tolist(), keys)
+        yield from map(Message, inputs[among].tolist(), stamps[among].tolist(), received[among].tolist(), keys, frames)
+
+
+def transforms_beside(streams: Sequence[Stream]) -> RecordedTransforms | None:
+    """Return the transforms for which the sets of a group wait; None where it waits for none."""
+    return next((stream.transforms for stream in streams if stream.transforms is not None), None)
 
 
 def stamped(group: GroupConfig, streams: Sequence[Stream]) -> list[Stream]:
@@ -171,12 +197,18 @@ def stamped(group: GroupConfig, streams: Sequence[Stream]) -> list[Stream]:
     ]
 
 
-def _pour(recording: Recording, filled: _Filled) -> None:
-    columns = Columns([readers for _, readers in filled])
+def _pour(recording: Recording, filled: _Filled, transforms: RecordedTransforms | None = None) -> None:
+    channels = [] if transforms is None else transform_channels(recording)
+    reader = TransformReader(channels)
+    columns = Columns([*(readers for _, readers in filled), [(channel, receipt_column) for channel in channels]])
     begin = 0
     for batch in map(Batch, recording.batches(columns.channels)):
         for index, column in columns.read(batch):
-            filled[index][0].add(column, batch, begin)
+            if index < len(filled):
+                filled[index][0].add(column, batch, begin)
+            elif transforms is not None:
+                for raw in map(batch.rows.__getitem__, column.places.tolist()):
+                    transforms.add(reader.read(raw), raw[1])
         begin += len(batch.rows)
 
 

@@ -18,7 +18,7 @@ from syncrelay.explain import (
 )
 from syncrelay.explain.trials import Trials
 from syncrelay.recordings.analysis.evaluation import Outcomes
-from syncrelay.recordings.analysis.streams import Stream, messages
+from syncrelay.recordings.analysis.streams import Stream, messages, transforms_beside
 from syncrelay.sync import Message
 
 _SECOND: Final = 1_000_000_000
@@ -86,7 +86,7 @@ class _Watch:
         self, group: GroupConfig, streams: Sequence[Stream], *, began: int, whole: Callable[[], Trials] | None
     ) -> None:
         self._outcomes = Outcomes(group)
-        self._driver = EngineDriver(group, self._outcomes.take)
+        self._driver = EngineDriver(group, self._outcomes.take, transforms_beside(streams))
         self._watch = GroupWatch(group, began=began, whole=whole)
         self._judge_of = Judge()
         self._due = began + _SECOND
@@ -133,7 +133,9 @@ class _Watch:
         self._arrivals = [[] for _ in self._arrivals]
         sets.clear()
         self._outcomes.drops.clear()
-        for finding in self._judge_of.judge(self._watch.facts(self._graph, now=now, is_recorded=True)):
+        for finding in self._judge_of.judge(
+            self._watch.facts(self._graph, now=now, is_recorded=True)
+        ):
             key = (finding.code, finding.input)
             before = self._found[key].seconds if key in self._found else 0
             self._found[key] = LastingFinding(finding, before + lasting)

@@ -75,6 +75,11 @@ def column_reader(group: GroupConfig, index: int, channel: Channel) -> ReadColum
     return _one_by_one(message_reader(group, index, channel))
 
 
+def receipt_column(batch: Batch, places: Places) -> tuple[Nanoseconds, None]:
+    """Return times of receipt in place of stamps, as a ReadColumn."""
+    return batch.received[places], None
+
+
 def stamp_or_receipt_column(channel: Channel) -> ReadColumn:
     """Return what reads header stamps, or receive times if the type is unknown or has no header."""
     has_header = isinstance(channel.encoding, Encoding) and bool(begins_with_header(channel))
@@ -84,7 +89,7 @@ def stamp_or_receipt_column(channel: Channel) -> ReadColumn:
 def _stamp_column(source: StampSource, channel: Channel) -> ReadColumn:
     read = stamp_reader(source, channel)
     if read is None:
-        return lambda batch, places: (batch.received[places], None)
+        return receipt_column
     if read in _IN_ONE_GO:
         read_all = _IN_ONE_GO[read]
         return lambda batch, places: (read_all(batch.heads[places]), None)

@@ -6,8 +6,9 @@ from typing import Any, Final, TypeAlias
 
 from syncrelay.explain import UNREADABLE, EngineDriver
 from syncrelay.recordings.bag.bindings import GroupBinding
-from syncrelay.recordings.bag.columns import Batch, Columns, ReadColumn, column_reader
+from syncrelay.recordings.bag.columns import Batch, Columns, ReadColumn, column_reader, receipt_column
 from syncrelay.recordings.bag.recording import Channel, RawMessage, Recording
+from syncrelay.recordings.bag.transforms import TransformReader, frame_reader, transform_channels
 from syncrelay.sync import InputCounts, Message, Outcome
 
 Listener: TypeAlias = Callable[[GroupBinding, Outcome, int], None]
@@ -36,7 +37,7 @@ class GroupReplay:
 
     def __init__(self, binding: GroupBinding, listeners: Sequence[Listener]) -> None:
         self.binding = binding
-        self.driver: Final = EngineDriver(binding.group, self._take if listeners else None)
+        self.driver: Final = EngineDriver(binding.group, self._take if listeners else None, ())
         self._listeners = listeners
 
     def readers(self) -> Iterator[list[tuple[Channel, ReadColumn]]]:
@@ -66,13 +67,24 @@ class Replay:
         """Raises BagError for a stamp or key that a recorded type does not have."""
         self._recording = recording
         self._groups = [GroupReplay(binding, listeners) for binding in bindings]
+        awaiting = [each for each in self._groups if each.binding.group.options.transforms is not None]
+        self._awaiting = [group.driver for group in awaiting]
+        channels = transform_channels(recording) if awaiting else []
+        self._transforms = TransformReader(channels)
         self._columns = Columns(
-            [readers for group in self._groups for readers in group.readers()],
+            [
+                *(readers for group in self._groups for readers in group.readers()),
+                [(channel, receipt_column) for channel in channels],
+            ],
             [topic.device_clock() for binding in bindings for topic in binding.group.topics],
         )
         # A set whose deadline has passed leaves before a later message is fed to any group.
         self._waiting = [group.driver for group in self._groups if group.driver.has_deadlines]
-        self._inputs = [(group.driver, index) for group in self._groups for index in range(len(group.binding.inputs))]
+        self._inputs = [
+            (group.driver, index, frame_reader() if group in awaiting else None)
+            for group in self._groups
+            for index in range(len(group.binding.inputs))
+        ]
         self._now = recording.begin
 
     def steps(self) -> Iterator[None]:
@@ -89,11 +101,20 @@ class Replay:
             self._now = now = raw[1]
             for driver in self._waiting:
                 driver.expire(now)
-            driver, index = self._inputs[place]
+            if place == len(self._inputs):
+                self._learn(raw)
+                continue
+            driver, index, read_frame = self._inputs[place]
             if stamp == UNREADABLE:
                 driver.reject(index, raw, now=now)
             else:
-                driver.add(Message(index, stamp, raw, key), now=now)
+                frame = None if read_frame is None else read_frame(raw)
+                driver.add(Message(index, stamp, raw, key, frame), now=now)
+
+    def _learn(self, raw: RawMessage) -> None:
+        edges = self._transforms.read(raw)
+        for driver in self._awaiting:
+            driver.learn(edges, now=raw[1])
 
     def results(self) -> list[GroupResult]:
         """Return what became of all messages so far, in the order of the groups."""

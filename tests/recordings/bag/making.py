@@ -16,8 +16,10 @@ from tests.ros.cdr_messages import NS_PER_SECOND, STORE, VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
 from tests.ros.streams import MS, at
+from tests.ros.transforms import TF
 
 ROS1_STORE = get_typestore(Stores.ROS1_NOETIC)
+ROS1_STORE.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms\n", TF))
 CUSTOM = "rig_msgs/msg/Blip"
 CUSTOM_TEXT = "std_msgs/Header header\nbuiltin_interfaces/Time seen\nuint32 number\nstring label\n"
 CUSTOM_STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -110,6 +112,8 @@ def write_ros1(path: Path, frames: Sequence[Frame], *, compression: Any = None, 
 def as_ros1(frame: Frame, number: int) -> bytes:
     """The payload as ROS 1 has it; rosbags writes a `seq` of 0, which must not be what makes it work."""
     payload = bytes(STORE.cdr_to_ros1(frame.payload, frame.type_name))
+    if frame.type_name == TF:
+        return payload
     return (number + 7).to_bytes(4, "little") + payload[4:]
 
 

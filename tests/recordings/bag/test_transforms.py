@@ -1,0 +1,96 @@
+"""Sets of a recording wait for the transforms that were recorded beside them, as they would have live."""
+
+import pytest
+
+from syncrelay.recordings.analysis.evaluation import evaluate
+from syncrelay.recordings.analysis.streams import read_streams
+from syncrelay.recordings.analysis.watching import watch_group
+from syncrelay.recordings.bag.replay import replay
+from syncrelay.sync import Drop, DropReason, Match
+from tests.recordings.bag.making import CUSTOM_STORE, HEADERLESS, write_mcap, write_ros1, write_rosbag2
+from tests.recordings.bag.reading import bound
+from tests.ros.cdr_messages import VECTOR, vector
+from tests.ros.configs import config, inputs
+from tests.ros.frames import Frame
+from tests.ros.streams import BEGIN, MS
+from tests.ros.transforms import transforms
+
+PERIOD = 100 * MS
+FILE = config(
+    {
+        "front": {
+            "policy": "exact_time",
+            "transforms": {"target": "odom", "wait": "100ms"},
+            "topics": inputs({"/a": VECTOR, "/b": VECTOR}),
+        }
+    }
+)
+
+
+def frames(*, count=40, late=30 * MS, frame="camera", moving="/tf"):
+    """Pairs at 10 Hz, received at their stamps; /tf at 50 Hz, received `late` after its stamps."""
+    found = [transforms("/tf_static", ("base_link", "camera", BEGIN), received=BEGIN - 2 * PERIOD)]
+    for number in range(count):
+        stamp = BEGIN + number * PERIOD
+        found += [
+            Frame("/a", VECTOR, stamp, vector(stamp, frame_id=frame)),
+            Frame("/b", VECTOR, stamp, vector(stamp, frame_id="odom")),
+        ]
+    for number in range(-10, count * 5):
+        stamp = BEGIN + number * 20 * MS + 7
+        found.append(transforms(moving, ("odom", "base_link", stamp), received=stamp + late))
+    return sorted(found, key=lambda each: each.time)
+
+
+def replayed(path, text=FILE):
+    left = []
+    with bound(path, text=text) as (recording, bindings):
+        (result,) = replay(recording, bindings, listeners=[lambda _, outcome, now: left.append((outcome, now))])
+    return left, result
+
+
+def evaluated(path):
+    with bound(path, text=FILE) as (recording, bindings):
+        (streams,) = read_streams(recording, bindings)
+        group = bindings[0].group
+        return evaluate(group, streams), watch_group(group, streams)
+
+
+@pytest.mark.parametrize("write", [write_mcap, write_rosbag2, write_ros1])
+def test_a_set_leaves_when_the_transform_that_covers_it_was_received(write, tmp_path):
+    left, result = replayed(write(tmp_path / "drive.bag", frames()))
+    assert result.sets == 40
+    # The first transform behind a stamp is 7 ns newer, and 30 ms under way.
+    assert {now - outcome.stamps[0] for outcome, now in left if isinstance(outcome, Match)} == {30 * MS + 7}
+
+
+@pytest.mark.parametrize(("late", "sets"), [(90 * MS, 40), (150 * MS, 0)])
+def test_a_set_is_dropped_once_it_has_waited_too_long(late, sets, tmp_path):
+    path = write_mcap(tmp_path / "drive.mcap", frames(late=late))
+    left, result = replayed(path)
+    assert result.sets == sets
+    drops = [(each.reason, now - each.message.stamp) for each, now in left if isinstance(each, Drop)]
+    assert drops == [(DropReason.NO_TRANSFORM, 100 * MS)] * 2 * (40 - sets)
+    evaluation, _ = evaluated(path)
+    assert [set_.left for set_ in evaluation.sets] == [now for each, now in left if isinstance(each, Match)]
+    assert [each.dropped for each in evaluation.counts] == [each.counts.dropped for each in result.inputs]
+
+
+def test_a_recording_without_transforms_gives_no_sets_and_messages_without_a_header_need_none(tmp_path):
+    path = write_mcap(tmp_path / "none.mcap", [each for each in frames() if each.topic in ("/a", "/b")])
+    _, result = replayed(path)
+    assert result.sets == 0
+    note = CUSTOM_STORE.types[HEADERLESS]("x")
+    notes = [
+        Frame(topic, HEADERLESS, BEGIN + number * PERIOD, bytes(CUSTOM_STORE.serialize_cdr(note, HEADERLESS)))
+        for number in range(3)
+        for topic in ("/a", "/b")
+    ]
+    group = {
+        "policy": "approximate_time_eager",
+        "slop": "10ms",
+        "transforms": {"target": "odom"},
+        "topics": inputs({"/a": HEADERLESS, "/b": HEADERLESS}, stamp="receive"),
+    }
+    _, result = replayed(write_mcap(tmp_path / "notes.mcap", notes, store=CUSTOM_STORE), config({"front": group}))
+    assert result.sets == 3
