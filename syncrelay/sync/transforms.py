@@ -85,11 +85,10 @@ class Lapse:
 
 
 @dataclass(slots=True)
-class _Waiting:
-    """A set, what its messages need, and what was missing at some version of the chains."""
+class _Needs:
+    """The inputs, frames and stamps of a set that was matched at `since`, and what it lacked at some version."""
 
-    match: Match
-    needs: tuple[tuple[int, str, int], ...]
+    of: tuple[tuple[int, str, int], ...]
     since: int
     version: int | None = None
     lapse: Lapse | None = None
@@ -108,10 +107,10 @@ class TransformStage:
     def __init__(self, transforms: Transforms, *, n_inputs: int, repeats: bool, most: int) -> None:
         self._transforms = transforms
         self._most = most
-        self._waiting: deque[_Waiting] = deque()
+        self._waiting: deque[tuple[Match, _Needs]] = deque()
         self._withheld = Withheld(n_inputs, DropReason.NO_TRANSFORM) if repeats else None
         self._passed: list[int | None] = [None] * n_inputs
-        self._followed: deque[_Waiting] = deque(maxlen=_FOLLOWED)
+        self._followed: deque[_Needs] = deque(maxlen=_FOLLOWED)
         self.lapses: deque[Lapse] = deque(maxlen=_FOLLOWED)
         """The sets that were given up last, oldest first; and once more when it is known what wait they needed."""
 
@@ -122,7 +121,7 @@ class TransformStage:
             if isinstance(outcome, Drop):
                 left.append(outcome)
                 continue
-            self._waiting.append(_Waiting(outcome, self._needs(outcome), now))
+            self._waiting.append((outcome, _Needs(_needs(outcome), now)))
             left += self.release(now)
             if len(self._waiting) > self._most:
                 left += self._give_up()
@@ -134,7 +133,7 @@ class TransformStage:
         left: list[Outcome] = []
         while self._waiting:
             ready = self._first_ready()
-            head = self._waiting[0]
+            _, head = self._waiting[0]
             if ready == 0:
                 left += self._let_pass()
             elif ready is not None or now >= self._deadline(head) or _is_without_frame(head):
@@ -145,7 +144,7 @@ class TransformStage:
 
     def next_deadline(self) -> int | None:
         """Return when the first of the waiting sets is given up."""
-        return self._deadline(self._waiting[0]) if self._waiting else None
+        return self._deadline(self._waiting[0][1]) if self._waiting else None
 
     def flush(self, reason: DropReason) -> list[Drop]:
         """Drop everything, and be as new."""
@@ -164,7 +163,8 @@ class TransformStage:
             return self.flush(reason)
         drops: list[Drop] = []
         while self._waiting:
-            drops += self._withheld.note_stopped(self._waiting.popleft().match)
+            match, _ = self._waiting.popleft()
+            drops += self._withheld.note_stopped(match)
         return drops
 
     def buffered(self, index: int) -> int:
@@ -174,45 +174,37 @@ class TransformStage:
 
     def _unseen(self, index: int) -> list[Message]:
         """Return the messages of an input that are in waiting sets, and were in none before."""
-        messages = [message for each in self._waiting if (message := each.match.messages[index]) is not None]
+        messages = [message for match, _ in self._waiting if (message := match.messages[index]) is not None]
         if self._withheld is None:
             return messages
         seen = {self._passed[index], self._withheld.stamp(index)}
         return [message for stamp, message in {each.stamp: each for each in messages}.items() if stamp not in seen]
 
-    def _needs(self, match: Match) -> tuple[tuple[int, str, int], ...]:
-        """Return the inputs, frames and stamps with which the messages of a set leave."""
-        return tuple(
-            (message.input, message.frame, message.stamp if match.stamp is None else match.stamp)
-            for message in match.messages
-            if message is not None and message.frame is not None
-        )
-
     def _first_ready(self) -> int | None:
         """Return the place of the first set that can leave; None where one before it is worth waiting for."""
-        for place, each in enumerate(self._waiting):
-            lapse = self._look(each)
+        for place, (_, needs) in enumerate(self._waiting):
+            lapse = self._look(needs)
             if lapse is None:
                 return place
             if lapse.missing.lack not in (Lack.PAST, Lack.NO_FRAME):
                 break
         return None
 
-    def _look(self, waiting: _Waiting) -> Lapse | None:
+    def _look(self, needs: _Needs) -> Lapse | None:
         """Return what a set lacks now."""
         chains = self._transforms.chains
-        if waiting.version != chains.version:
+        if needs.version != chains.version:
             found = [
                 Lapse(index, missing)
-                for index, frame, stamp in waiting.needs
+                for index, frame, stamp in needs.of
                 if (missing := chains.missing(self._transforms.target, frame, stamp)) is not None
             ]
-            waiting.lapse = max(found, key=lambda each: each.missing.rank, default=None)
-            waiting.version = chains.version
-        return waiting.lapse
+            needs.lapse = max(found, key=lambda each: each.missing.rank, default=None)
+            needs.version = chains.version
+        return needs.lapse
 
     def _let_pass(self) -> list[Outcome]:
-        match = self._waiting.popleft().match
+        match, _ = self._waiting.popleft()
         if self._withheld is None:
             return [match]
         for message in match.messages:
@@ -221,13 +213,13 @@ class TransformStage:
         return [*self._withheld.note_passed(match), match]
 
     def _give_up(self) -> list[Drop]:
-        waiting = self._waiting.popleft()
-        if waiting.lapse is not None:
-            self.lapses.append(waiting.lapse)
-            self._followed.append(waiting)
+        match, needs = self._waiting.popleft()
+        if needs.lapse is not None:
+            self.lapses.append(needs.lapse)
+            self._followed.append(needs)
         if self._withheld is not None:
-            return self._withheld.note_stopped(waiting.match)
-        return [Drop(message, DropReason.NO_TRANSFORM) for message in waiting.match.messages if message is not None]
+            return self._withheld.note_stopped(match)
+        return [Drop(message, DropReason.NO_TRANSFORM) for message in match.messages if message is not None]
 
     def _follow(self, now: int) -> None:
         """See which of the sets that were given up could leave now."""
@@ -242,9 +234,18 @@ class TransformStage:
                 return
             self._followed.popleft()
 
-    def _deadline(self, waiting: _Waiting) -> int:
-        return waiting.since + self._transforms.wait_ns
+    def _deadline(self, needs: _Needs) -> int:
+        return needs.since + self._transforms.wait_ns
 
 
-def _is_without_frame(waiting: _Waiting) -> bool:
-    return waiting.lapse is not None and waiting.lapse.missing.lack is Lack.NO_FRAME
+def _needs(match: Match) -> tuple[tuple[int, str, int], ...]:
+    """Return the inputs, frames and stamps with which the messages of a set leave."""
+    return tuple(
+        (message.input, message.frame, message.stamp if match.stamp is None else match.stamp)
+        for message in match.messages
+        if message is not None and message.frame is not None
+    )
+
+
+def _is_without_frame(needs: _Needs) -> bool:
+    return needs.lapse is not None and needs.lapse.missing.lack is Lack.NO_FRAME

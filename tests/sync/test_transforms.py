@@ -1,6 +1,8 @@
 """Sets that wait for transforms: what holds of every policy, and what becomes of sets that wait too long."""
 
+import gc
 import random
+import weakref
 from collections.abc import Sequence
 from typing import Any
 
@@ -176,3 +178,18 @@ def test_every_message_is_matched_dropped_or_buffered_and_sets_leave_in_order(na
             assert not matched[index] & dropped[index]
     engine.flush(DropReason.SHUTDOWN)
     assert [each.buffered for each in engine.counts()] == [0, 0, 0]
+
+
+def test_sets_that_were_given_up_are_followed_without_their_messages():
+    class Payload:
+        pass
+
+    payload = Payload()
+    gone = weakref.ref(payload)
+    engine = group(Frames(), wait=0)
+    engine.add(Message(0, START, payload, frame="cam"), now=START)
+    left = engine.add(Message(1, START, None), now=START)
+    assert [each.reason for each in left if isinstance(each, Drop)] == [DropReason.NO_TRANSFORM] * 2
+    del left, payload
+    gc.collect()
+    assert gone() is None
