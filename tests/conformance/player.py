@@ -26,6 +26,7 @@ from tests.conformance.script import PAIR, VECTOR, Script
 from tests.conformance.seen import MS, Seen, by_reason, endpoint, message, without_figures
 from tests.conformance.world import Reader, World, Writer
 from tests.ros.cdr_messages import vector
+from tests.ros.transforms import transforms
 from tests.simulated.running import Running
 
 _LOG: Final = logging.getLogger("syncrelay")
@@ -224,6 +225,12 @@ class Player:
         """A publisher publishes vectors with stamps since 1970, in nanoseconds."""
         for stamp in stamps:
             self._writers[name][0].write(vector(stamp, frame_id=name))
+
+    def transform(self, name: str, parent: str, child: str, *stamps: float) -> None:
+        """A publisher of transforms publishes one of each of these times."""
+        for stamp in stamps:
+            moved = transforms(name, (parent, child, self._begin + round(stamp * MS)))
+            self._writers[name][0].write(moved.payload)
 
     def feed(self, name: str, *stamps: float, frame: str = "", data: bytes | None = None) -> None:
         """As `write`, one after the other: each once the relay has had the one before."""

@@ -11,6 +11,7 @@ FLOAT: Final = "std_msgs/msg/Float64"
 REFERENCE: Final = "sensor_msgs/msg/TimeReference"
 CLOCK: Final = "rosgraph_msgs/msg/Clock"
 ARRAY: Final = "diagnostic_msgs/msg/DiagnosticArray"
+TF: Final = "tf2_msgs/msg/TFMessage"
 
 
 class Step(NamedTuple):

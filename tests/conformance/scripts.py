@@ -11,6 +11,7 @@ from tests.conformance.script import (
     POINT,
     REFERENCE,
     STRING,
+    TF,
     Step,
     do,
     group,
@@ -478,5 +479,26 @@ _LIFE: Final = (
         _SENSORS, do.relay(_front(manifest=False)), do.ready(), do.endpoints("/syncrelay/front/sets", publishers=0)),
 )
 
+_TREE: Final = (
+    *_SENSORS, do.publisher("/tf", of=TF, depth=100), do.publisher("/tf_static", of=TF, durability="transient_local"),
+    do.transform("/tf_static", "base_link", "camera", 0))
+_TRANSFORMS: Final = (
+    short("sets leave once their transforms have come",
+        _TREE, do.relay(_front(transforms={"target": "odom", "wait": "10s"})), _EARS, do.ready(),
+        do.sets(20, 30, frame="camera"), do.counts(buffered=4), do.transform("/tf", "odom", "base_link", 10, 25),
+        _out(1), do.counts(buffered=2), do.transform("/tf", "odom", "base_link", 35), _out(2), do.counts(buffered=0),
+        *(do.endpoints(each, publishers=1, subscribers=1) for each in ("/tf", "/tf_static"))),
+    long("what cannot be transformed in time is dropped, and a reload can do without transforms",
+        _TREE, do.relay(_front(transforms={"target": "odom", "wait": "50ms"})), _EARS, do.ready(),
+        do.sets(20, frame="lens"), do.counts(buffered=0), do.finding("no_transform", naming="/a"), do.file(PAIR),
+        do.call("reload"), do.endpoints("/tf", publishers=1, subscribers=0),
+        do.endpoints("/tf_static", publishers=1, subscribers=0), do.sets(30, frame="lens"), _out(1)),
+    long("what waits for transforms when the relay is paused is dropped as that",
+        _TREE, do.relay(_front(transforms={"target": "odom", "wait": "10s"})), _EARS, do.ready(),
+        do.sets(20, frame="camera"), do.counts(buffered=2), do.call("pause"), do.counts(buffered=0),
+        do.transform("/tf", "odom", "base_link", 10, 50), do.call("resume"), do.sets(40, frame="camera"), _out(1),
+        do.counts(buffered=0)),
+)
+
 # fmt: on
-SCRIPTS: Final = (*_QOS, *_HISTORIES, *_SENT, *_GRAPH, *_MESSAGES, *_POLICIES, *_CLOCKS, *_LIFE)
+SCRIPTS: Final = (*_QOS, *_HISTORIES, *_SENT, *_GRAPH, *_MESSAGES, *_POLICIES, *_CLOCKS, *_LIFE, *_TRANSFORMS)

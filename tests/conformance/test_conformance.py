@@ -3,7 +3,9 @@
 import multiprocessing
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Final
 
 import pytest
 
@@ -11,17 +13,19 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from tests.conformance.player import play
 from tests.conformance.real import serve
-from tests.conformance.script import Script
+from tests.conformance.script import TF, Script
 from tests.conformance.scripts import SCRIPTS
 from tests.conformance.seen import KNOWN, Seen, told
 from tests.conformance.simulated import SimulatedWorld
 from tests.faults.extent import IS_LONG
 from tests.ros.stage import IS_COMPILED
 
+_HAS_TF: Final = find_spec("tf2_msgs") is not None
+PLAYED: Final = [each for each in SCRIPTS if _HAS_TF or not any(step.keys.get("of") == TF for step in each.steps)]
 # Without the compiled path, messages of several publishers are not told apart.
 _ON_DDS = [
     each
-    for each in SCRIPTS
+    for each in PLAYED
     if (each.is_short or IS_LONG)
     and (IS_COMPILED or not any(step.verb == "sent" and "other" in step.keys for step in each.steps))
 ]
@@ -62,7 +66,7 @@ def real(tmp_path_factory) -> Iterator[Callable[[Script, Path], Seen]]:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("script", SCRIPTS, ids=_titles(SCRIPTS))
+@pytest.mark.parametrize("script", PLAYED, ids=_titles(PLAYED))
 def test_the_simulator_shows_what_is_known_with_any_seed(script, tmp_path):
     one, other = (_simulated(script, tmp_path, seed) for seed in (1, 2))
     assert told(script.title, one, script.blind).splitlines() == _KNOWN[script.title]
