@@ -3,7 +3,7 @@
 from syncrelay.config.export import ExportFeature, ExportSource, LerobotConfig
 from syncrelay.config.listen import Listen
 from syncrelay.config.load import Config, load, load_text
-from syncrelay.config.models import Distance, StampField, StampSource, Tolerance
+from syncrelay.config.models import Distance, StampField, StampSource, Tolerance, TransformsConfig
 from syncrelay.config.problems import ConfigError, Problem, Severity, Span, render, where
 from syncrelay.config.qos import AUTO, QosOverrides, QosPreset
 from syncrelay.config.resolved import GroupConfig, TopicConfig
@@ -30,6 +30,7 @@ __all__ = [
     "StampSource",
     "Tolerance",
     "TopicConfig",
+    "TransformsConfig",
     "Transport",
     "load",
     "load_text",

@@ -153,9 +153,7 @@ class TypeChecks:
         path = (*group.path, "transforms")
         if group.options.transforms is not None and not self._is_installed(TF_TYPE):
             text = f"{TF_TYPE} is not installed here, or not sourced, and the relay needs it for this: {TF_INSTALL}"
-            yield self.document.problem(
-                path, text, code="package_missing", severity=Severity.NOTE, subject=TF_TYPE.partition("/")[0]
-            )
+            yield self.document.problem(path, text, code="transforms_missing", severity=Severity.NOTE, subject=TF_TYPE)
 
     def _asked_fields(self, topic: TopicConfig, path: Path) -> Iterator[_WantedField]:
         """Yield the fields of its messages that the file names for a topic."""

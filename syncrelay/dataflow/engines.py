@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Collection, Sequence
 
-from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
+from syncrelay.sync import Drop, DropReason, Lapse, Match, Message, SyncGroup
 from syncrelay.sync.counts import InputCounts
 
 
@@ -15,6 +15,7 @@ class StoppedEngine:
 
     def __init__(self, sets: int, counts: tuple[InputCounts, ...], *, most: int = 0) -> None:
         self.sets = sets
+        self.lapses: tuple[Lapse, ...] = ()
         self.held: deque[tuple[Message, DropReason | None]] = deque(maxlen=most)
         self._counts = counts
 
@@ -56,6 +57,10 @@ class PausedEngine:
     @property
     def sets(self) -> int:
         return self.engine.sets
+
+    @property
+    def lapses(self) -> Sequence[Lapse]:
+        return self.engine.lapses
 
     def add(self, message: Message, *, now: int) -> Sequence[Match | Drop]:
         if message.input not in self._held:

@@ -15,7 +15,7 @@ from syncrelay.dataflow.flow import Engine, Flow, Refusals, Unpublished
 from syncrelay.dataflow.manifest_queue import GroupManifests
 from syncrelay.explain import Code, RecentDrop, Stamps, Tape, words
 from syncrelay.runtime import SYSTEM, Runtime
-from syncrelay.sync import DropReason, SyncGroup
+from syncrelay.sync import DropReason, Lapse, SyncGroup
 from syncrelay.sync.counts import InputCounts
 
 _LOG = logging.getLogger("syncrelay")
@@ -31,8 +31,8 @@ class Batch(NamedTuple):
     """What came and left since the last evaluation, oldest first.
 
     `arrivals` are stamps and times of receipt of each input, `sets` the sets' stamps and their latencies, `keys` what
-    the newest messages are matched by, `last` what left last of all; times in nanoseconds. `counts` and `n_sets` are
-    those since the group began.
+    the newest messages are matched by, `lapses` the last sets that could not be transformed, `last` what left last of
+    all; times in nanoseconds. `counts` and `n_sets` are those since the group began.
     """
 
     arrivals: tuple[deque[tuple[int, int]], ...]
@@ -40,6 +40,7 @@ class Batch(NamedTuple):
     keys: tuple[Hashable, ...]
     counts: tuple[InputCounts, ...]
     n_sets: int
+    lapses: tuple[Lapse, ...]
     last: tuple[Stamps | RecentDrop, ...]
 
 
@@ -191,7 +192,15 @@ class GroupRelay:
         """Give what came and left since this was last asked for, and all counts."""
         flow = self.flow
         arrivals, sets = flow.watched()
-        return Batch(arrivals, sets, tuple(flow.keys), self.counts(), self.engine.sets, tuple(flow.last))
+        return Batch(
+            arrivals,
+            sets,
+            tuple(flow.keys),
+            self.counts(),
+            self.engine.sets,
+            tuple(self.engine.lapses),
+            tuple(flow.last),
+        )
 
     def expire(self, now: int) -> None:
         """Let go what has waited long enough."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Final
 
 from syncrelay.config import Config, Listen, Problem, Severity, render
+from syncrelay.config.typechecks import TF_INSTALL
 from syncrelay.config.wording import all_of, counted
 from syncrelay.doctor.diagnosis import Diagnosis, error, info
 from syncrelay.errors import ListenError
@@ -21,7 +22,8 @@ def check_files(files: Sequence[str], problems: Sequence[Problem]) -> Iterator[D
     warnings = [problem for problem in problems if problem.severity is Severity.WARNING]
     noted = [problem for problem in problems if problem.severity is Severity.NOTE]
     missing = [replace(each, severity=Severity.ERROR) for each in noted if each.code == "package_missing"]
-    unchecked = [problem for problem in noted if problem.code != "package_missing"]
+    refused = [replace(each, severity=Severity.ERROR) for each in noted if each.code == "transforms_missing"]
+    unchecked = [problem for problem in noted if problem.code not in ("package_missing", "transforms_missing")]
     if errors:
         yield error(
             "file",
@@ -43,6 +45,13 @@ def check_files(files: Sequence[str], problems: Sequence[Problem]) -> Iterator[D
             impact="the relay starts, but the groups with these types wait until the packages are there",
             fix="build the packages with colcon for this Python, then in this shell: source install/setup.bash\n"
             "(for the image: put them into docker/messages before you build it)",
+        )
+    if refused:
+        yield error(
+            "transforms_missing",
+            f"{named} lets sets wait for transforms, and the type of /tf is not installed here:\n{render(refused)}",
+            impact="the relay refuses the file and exits at once",
+            fix=TF_INSTALL.replace("`", ""),
         )
     if unchecked:
         yield info(

@@ -79,6 +79,7 @@ class Code(Enum):
     OVER_SLOP = "over_slop", Of.MATCHING, _WARN_OR_ERROR
     SHORT_QUEUE = "short_queue", Of.MATCHING, _WARN_OR_ERROR
     WAITING_FOR_OPTIONAL = "waiting_for_optional", Of.MATCHING, _OK_OR_WARN
+    NO_TRANSFORM = "no_transform", Of.MATCHING, _WARN_OR_ERROR
     CONSTANT_OFFSET = "constant_offset", Of.MATCHING, _WARN
     OUT_OF_ORDER = "out_of_order", Of.ORDER, _WARN
     DUPLICATES = "duplicates", Of.ORDER, _WARN

@@ -5,12 +5,13 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple, TypedDict
 
 from syncrelay.clock import Step
-from syncrelay.config import Distance, Tolerance
+from syncrelay.config import Distance, Tolerance, TransformsConfig
 from syncrelay.config.profile import Mismatch, Profile
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.standing import Standing
 from syncrelay.explain.suggester import Suggester
 from syncrelay.explain.unneeded import DropFates, drop_fates, may_set_pace
+from syncrelay.sync import Lapse
 from syncrelay.sync.counts import InputCounts
 
 _SECOND: Final = 1_000_000_000
@@ -228,6 +229,7 @@ class Around(TypedDict, total=False):
     empty_graph: GraphSnapshot | None
     is_discovering: bool
     inactive: str | None
+    lapses: Sequence[Lapse]
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,6 +288,10 @@ class GroupFacts:
     """The graph, where it holds no node but our own."""
     is_discovering: bool = False
     """Whether running nodes may be missing from the graph, because this one has just joined it."""
+    transforms: TransformsConfig | None = None
+    """The transforms for which its sets wait."""
+    lapses: Sequence[Lapse] = ()
+    """The last sets that were given up because they could not be transformed."""
     inactive: str | None = None
     """The name of a managed node that waits to be activated."""
     standing: Standing = Standing.ENOUGH

@@ -15,7 +15,16 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from syncrelay.explain import rules_clock, rules_drift, rules_flow, rules_graph, rules_matching, rules_stamps, words
+from syncrelay.explain import (
+    rules_clock,
+    rules_drift,
+    rules_flow,
+    rules_graph,
+    rules_matching,
+    rules_stamps,
+    rules_transforms,
+    words,
+)
 from syncrelay.explain.codes import MATCHING, Code, Of, Severity, codes_of
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import Finding, Rule, of_each_input
@@ -59,6 +68,7 @@ _MATCHING_RULES: Final[tuple[Rule, ...]] = (
     Rule(Code.OVER_SLOP, rules_clock.too_old),
     of_each_input(Code.SHORT_QUEUE, rules_matching.short_queue),
     of_each_input(Code.WAITING_FOR_OPTIONAL, rules_matching.waiting_for_optional),
+    Rule(Code.NO_TRANSFORM, rules_transforms.no_transform),
     Rule(Code.CONSTANT_OFFSET, rules_matching.constant_offset),
 )
 """What they suggest they try, which costs: they are not asked for what a cause explains."""

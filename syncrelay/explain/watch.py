@@ -140,6 +140,7 @@ class GroupWatch:
             max_wait=options.max_wait,
             every=options.every,
             least_period=options.max_rate,
+            transforms=options.transforms,
             unpaused=self._unpaused,
             suggester=self._suggester,
             **around,

@@ -212,6 +212,7 @@ class Monitor:
             is_discovering=self._discovery.goes_on(self._runtime.monotonic()),
             empty_graph=None if all(each.publishers for each in shown) else self._empty_graph,
             inactive=self.inactive,
+            lapses=batch.lapses,
         )
         found = judge.judge(facts)
         self._reports[binding.group] = GroupReport(facts, found, batch.last)

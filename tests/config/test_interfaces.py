@@ -50,6 +50,14 @@ def test_a_package_that_may_come_later_is_a_note(environ):
     assert note.text.endswith("not sourced, did you mean `sensor_msgs`?")
 
 
+def test_transforms_without_the_type_of_tf_are_a_note_that_says_what_to_install(environ):
+    text = FILE.format(type="sensor_msgs/msg/Image").replace("policy:", "transforms: {target: base_link}\n    policy:")
+    (note,) = load_text(text, environ=environ).notes
+    assert (note.path, note.severity, note.code) == ("groups.front.transforms", Severity.NOTE, "transforms_missing")
+    assert "tf2_msgs/msg/TFMessage is not installed here" in note.text
+    assert "apt-get install ros-jazzy-tf2-msgs" in note.text
+
+
 def test_a_restamp_is_believed_if_a_type_cannot_be_looked_into(environ):
     text = FILE.format(type="my_msgs/msg/Mine, stamp: receive").replace("sensor_msgs/msg/Image", "std_msgs/msg/String")
     text = text.replace("String}", "String, stamp: receive}").replace(

@@ -39,9 +39,11 @@ def test_what_is_hardly_meant_is_told_apart_from_what_could_not_be_checked():
     problems = [
         Problem("f.yaml", "", "no package", "package_missing", severity=Noted.NOTE, subject="my_msgs"),
         Problem("f.yaml", "", "no unit", "unit", severity=Noted.WARNING),
+        Problem("f.yaml", "", "no tf2_msgs", "transforms_missing", severity=Noted.NOTE),
         Problem("f.yaml", "", "no .msg file", "not_checked", severity=Noted.NOTE),
     ]
     found = {each.code: each.what for each in check_files(["f.yaml"], problems)}
-    assert found.keys() == {"package_missing", "file_doubtful", "not_checked"}
+    assert found.keys() == {"package_missing", "transforms_missing", "file_doubtful", "not_checked"}
+    assert "no tf2_msgs" not in found["not_checked"]
     assert "no unit" in found["file_doubtful"]
     assert "no unit" not in found["not_checked"]

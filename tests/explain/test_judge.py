@@ -5,14 +5,14 @@ import pytest
 from syncrelay.explain import ClockState, Code, Finding, Severity, explanation, judge, with_ok
 from syncrelay.explain.judge import EXPLAINS
 from syncrelay.sync.messages import DropReason
-from tests.explain.support import cases_flow, cases_graph, cases_stamps
+from tests.explain.support import cases_flow, cases_graph, cases_stamps, cases_transforms
 from tests.explain.support.cases import STRANGER, UNFIT, camera, fed, said_of_cases
 from tests.explain.support.groups import S, a_group, a_silent_group, an_input
 
-FOUND = cases_graph.FOUND | cases_stamps.FOUND | cases_flow.FOUND
+FOUND = cases_graph.FOUND | cases_stamps.FOUND | cases_flow.FOUND | cases_transforms.FOUND
 QUIETLY = [
     pytest.param(code, facts, id=name)
-    for module in (cases_graph, cases_stamps, cases_flow)
+    for module in (cases_graph, cases_stamps, cases_flow, cases_transforms)
     for code, cases in module.QUIETLY.items()
     for name, facts in cases.items()
 ]

@@ -134,7 +134,7 @@ class _Watch:
         sets.clear()
         self._outcomes.drops.clear()
         for finding in self._judge_of.judge(
-            self._watch.facts(self._graph, now=now, is_recorded=True)
+            self._watch.facts(self._graph, now=now, is_recorded=True, lapses=tuple(engine.lapses))
         ):
             key = (finding.code, finding.input)
             before = self._found[key].seconds if key in self._found else 0

@@ -1,7 +1,10 @@
 """Sets of a recording wait for the transforms that were recorded beside them, as they would have live."""
 
+import re
+
 import pytest
 
+from syncrelay.explain import Code, Severity
 from syncrelay.recordings.analysis.evaluation import evaluate
 from syncrelay.recordings.analysis.streams import read_streams
 from syncrelay.recordings.analysis.watching import watch_group
@@ -94,3 +97,29 @@ def test_a_recording_without_transforms_gives_no_sets_and_messages_without_a_hea
     }
     _, result = replayed(write_mcap(tmp_path / "notes.mcap", notes, store=CUSTOM_STORE), config({"front": group}))
     assert result.sets == 3
+
+
+def test_the_edge_that_lags_is_named_and_the_wait_that_is_suggested_has_all_sets_leave(tmp_path):
+    path = write_mcap(tmp_path / "drive.mcap", frames(count=150, late=150 * MS))
+    _, (found, *others) = evaluated(path)
+    assert (found.finding.code, others) == (Code.NO_TRANSFORM, [])
+    assert found.finding.text.startswith("odom -> base_link is 150 ms behind /a: ")
+    wait = re.fullmatch(r"write `wait: (\w+)`", found.finding.suggestion or "")
+    assert wait is not None
+    _, result = replayed(path, FILE.replace("100ms", wait[1]))
+    assert result.sets == 150
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"frame": "lens"}, "no transform names lens, the frame_id of /a: "),
+        ({"frame": ""}, "messages of /a have an empty frame_id: "),
+        ({"moving": "/elsewhere"}, "no transform names the target odom: "),
+    ],
+)
+def test_what_is_missing_of_the_tree_is_named(keys, told, tmp_path):
+    _, (found, *_) = evaluated(write_mcap(tmp_path / "drive.mcap", frames(count=150, **keys)))
+    assert found.finding.code is Code.NO_TRANSFORM
+    assert found.finding.severity is Severity.ERROR
+    assert found.finding.text.startswith(told), found.finding.text

@@ -1,0 +1,88 @@
+"""The finding about transforms: which edge is missing, by how much it lags, and with what wait sets would leave."""
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Final
+
+from syncrelay.config.wording import counted
+from syncrelay.explain import words
+from syncrelay.explain.codes import Severity
+from syncrelay.explain.facts import GroupFacts, InputFacts
+from syncrelay.explain.findings import Fault, Found, nodes
+from syncrelay.sync import DropReason, Lack, Lapse, Missing
+
+# tf2 keeps transforms for 10 s: no `wait` may be longer.
+_LONGEST_WAIT: Final = 10_000_000_000
+_CHECK_BROADCASTER: Final = "check the node that publishes it on /tf"
+
+
+def no_transform(facts: GroupFacts) -> Found:
+    """Find sets that were dropped because they could not be transformed, by what most of them lacked."""
+    dropped = max(each.figures.dropped.get(DropReason.NO_TRANSFORM, 0) for each in facts.inputs)
+    if not dropped or not facts.lapses or facts.transforms is None:
+        return
+    lapses = [each for each in facts.lapses if each.needed_ns is None][-dropped:]
+    needed = [each.needed_ns for each in facts.lapses if each.needed_ns is not None][-dropped:]
+    (most, _), *_ = Counter(
+        (each.input, each.missing.lack, each.missing.parent, each.missing.child) for each in lapses
+    ).most_common(1)
+    last = next(each for each in reversed(lapses) if _of(each) == most)
+    an_input = facts.inputs[last.input]
+    text, cure = _told(last.missing, an_input, needed, facts)
+    sets = f"{counted(dropped, 'set')} {'was' if dropped == 1 else 'were'}"
+    yield Fault(
+        f"{text}: {sets} dropped as no_transform in the last 10 s",
+        cure,
+        Severity.ERROR if facts.is_silent else Severity.WARN,
+        input=last.input,
+    )
+
+
+def _of(lapse: Lapse) -> tuple[int, Lack, str, str]:
+    return lapse.input, lapse.missing.lack, lapse.missing.parent, lapse.missing.child
+
+
+def _told(missing: Missing, an_input: InputFacts, needed: Sequence[int], facts: GroupFacts) -> tuple[str, str]:
+    """Say what an input lacks, and what to do."""
+    name = an_input.name
+    match missing.lack:
+        case Lack.LATE:
+            return _late(missing, name, needed, facts)
+        case Lack.PAST:
+            text = f"the oldest transform {_edge(missing)} is {words.span_of_time(missing.by_ns)} newer than {name}"
+            cure = "check whether the clocks of both agree; tf2 keeps transforms for 10 s"
+        case Lack.UNKNOWN_FRAME if missing.child == missing.parent:
+            text = f"no transform names the target {missing.child}"
+            cure = "check `target`, and what publishes /tf and /tf_static"
+        case Lack.UNKNOWN_FRAME:
+            text = f"no transform names {missing.child}, the frame_id of {name}"
+            cure = "check what should publish it on /tf or /tf_static, and how it is spelled there"
+        case Lack.UNCONNECTED:
+            text = f"{missing.child}, the frame_id of {name}, and {missing.parent} are in two unconnected trees"
+            cure = "publish the transform that joins them on /tf or /tf_static"
+        case Lack.LOOP:
+            text = f"the tree of transforms has a loop at {missing.child}"
+            cure = "check which nodes publish a transform of it with another parent"
+        case Lack.NO_FRAME:
+            text, cure = f"messages of {name} have an empty frame_id", f"have {nodes(an_input)} fill it in"
+    return text, cure
+
+
+def _edge(missing: Missing) -> str:
+    return f"{missing.parent} -> {missing.child}"
+
+
+def _late(missing: Missing, name: str, needed: Sequence[int], facts: GroupFacts) -> tuple[str, str]:
+    edge, wait = _edge(missing), facts.transforms.wait if facts.transforms is not None else 0
+    longest = max(needed, default=0)
+    if not needed:
+        if not missing.by_ns:
+            return f"nothing is known of {edge} yet", _CHECK_BROADCASTER
+        return f"{edge} is {words.span_of_time(missing.by_ns)} behind {name}", _CHECK_BROADCASTER
+    text = f"{edge} is {words.duration(longest)} behind {name}"
+    if longest <= wait:
+        size = 2 * facts.queue_size
+        return f"{text}, and no more than {counted(facts.queue_size, 'set')} can wait", f"write `queue_size: {size}`"
+    if longest > _LONGEST_WAIT:
+        return text, _CHECK_BROADCASTER
+    return text, f"write `wait: {words.at_least(min(longest + longest // 10, _LONGEST_WAIT))}`"
