@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any, Final, TypeAlias, TypeVar
 
 from syncrelay.cdr import read_stamp
-from syncrelay.cdr_fields import FieldsOf, UnreadableFieldError, field_reader, time_reader
+from syncrelay.cdr_fields import field_reader, time_reader
+from syncrelay.cdr_walk import FieldsOf, UnreadableFieldError
 from syncrelay.config import StampField, StampSource
 from syncrelay.config.names import check_type_name
 from syncrelay.dataflow.backend import Content
@@ -106,12 +107,13 @@ def value_reader(message_type: Any, path: str) -> Callable[[Content], Any]:
 def _reader(make: Callable[[FieldsOf, str, str], _ReaderOf], message_type: Any, path: str) -> _ReaderOf:
     name = name_of(message_type)
     try:
-        return make(_fields_of, name.replace("/msg/", "/"), path)
+        return make(fields_of, name.replace("/msg/", "/"), path)
     except UnreadableFieldError as error:
         raise TypeImportError(f"{name} has no usable field {path}: {error}") from error
 
 
-def _fields_of(name: str) -> Mapping[str, str]:
+def fields_of(name: str) -> Mapping[str, str]:
+    """Return the fields of an installed type, named `pkg/Name`, and their types. Raises TypeImportError."""
     package, message = name.split("/")
     fields: Mapping[str, str] = import_type(f"{package}/msg/{message}").get_fields_and_field_types()
     return fields

@@ -13,6 +13,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from syncrelay.cdr_walk import FieldsOf
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag.plain_definitions import plain_idl, plain_msg
 from syncrelay.recordings.bag.recording import Channel, Definition
@@ -37,14 +38,17 @@ def typestore(type_name: str, definition: Definition | None) -> Typestore | None
     return store if type_name in store.fielddefs else None
 
 
-def fields_of(channel: Channel) -> Callable[[str], Mapping[str, str]] | None:
+def fields_of(channel: Channel) -> FieldsOf | None:
     """Return a function from a type (`pkg/Name`) within the channel's type to its fields, as in rosidl's classes.
 
     None if neither the recording nor ROS 2 knows the channel's type.
     """
-    store = _store_of(channel.type, channel.definition)
-    if channel.type not in store.fielddefs:
-        return None
+    store = typestore(channel.type, channel.definition)
+    return None if store is None else fields_in(store)
+
+
+def fields_in(store: Typestore) -> FieldsOf:
+    """Return a function from a type (`pkg/Name`) in a store to its fields, as in rosidl's classes."""
 
     def fields(name: str) -> Mapping[str, str]:
         package, _, message = name.partition("/")

@@ -5,7 +5,8 @@ from struct import Struct
 from typing import Any, Final, TypeAlias
 
 from syncrelay.cdr import LATEST_STAMP, has_place_for_stamp, read_stamp
-from syncrelay.cdr_fields import FieldsOf, UnreadableFieldError, field_reader, time_reader
+from syncrelay.cdr_fields import field_reader, time_reader
+from syncrelay.cdr_walk import FieldsOf, UnreadableFieldError
 from syncrelay.config import GroupConfig, StampField, StampSource
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag.definitions import begins_with_header, converter, fields_of

@@ -32,12 +32,30 @@ def drawn_type(chance: random.Random) -> tuple[Any, str]:
     """Return a typestore and a type in it, of up to three levels."""
     definitions: dict[str, str] = {}
     name = _define(chance, definitions, 2)
+    return _store_of(definitions), name
+
+
+def drawn_set(chance: random.Random) -> tuple[Any, str]:
+    """Return a typestore and a type in it whose fields are messages, between others."""
+    definitions: dict[str, str] = {}
+    lines = []
+    for number in range(chance.randint(2, 8)):
+        if chance.random() < 0.6:
+            kind = _define(chance, definitions, 2).replace("/msg/", "/")
+            lines.append(f"{kind} f{number}\n")
+        else:
+            lines.append(f"{chance.choice([*_NUMBERS, 'string'])}{chance.choice(_SHAPES)} f{number}\n")
+    definitions["made_msgs/msg/Set"] = "".join(lines)
+    return _store_of(definitions), "made_msgs/msg/Set"
+
+
+def _store_of(definitions: dict[str, str]) -> Any:
     store = get_typestore(Stores.EMPTY)
     types: dict[str, Any] = {}
     for each, text in definitions.items():
         types |= get_types_from_msg(text, each)
     store.register(types)
-    return store, name
+    return store
 
 
 def _define(chance: random.Random, definitions: dict[str, str], levels: int) -> str:
@@ -51,6 +69,12 @@ def _define(chance: random.Random, definitions: dict[str, str], levels: int) -> 
         lines.append(f"{kind}{chance.choice(_SHAPES)} f{number}\n")
     definitions[name] = chance.choice(_CONSTANTS) + "".join(lines)
     return name
+
+
+def drawn_message(store: Any, name: str, chance: random.Random) -> Any:
+    """Draw a message as rosbags serializes it."""
+    longest = LARGE if chance.random() < 0.01 else 3
+    return _message(store, name, chance, random.Random(chance.random()), longest)[1]
 
 
 def drawn_messages(store: Any, name: str, chance: random.Random, *, count: int = 6) -> Drawn:
