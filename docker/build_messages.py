@@ -1,9 +1,11 @@
 """Builds message packages into the Python environment that runs this, beside those of the ROS wheels.
 
-usage: build_messages.py FOLDER...
+usage: build_messages.py [--into PREFIX] FOLDER...
 
-Each FOLDER is a ROS package: `package.xml` and `msg/*.msg`. The wheels hold ROS's own generators; what CMake would
-do with their output, a C compiler is told to do here. Only what a Python node on Fast DDS needs is made.
+With --into they are built into another prefix: its `lib` is for LD_LIBRARY_PATH, its site-packages for PYTHONPATH, and
+the prefix itself for AMENT_PREFIX_PATH. Each FOLDER is a ROS package: `package.xml` and `msg/*.msg`. The wheels hold
+ROS's own generators; what CMake would do with their output, a C compiler is told to do here. Only what a Python node on
+Fast DDS needs is made.
 """
 
 import os
@@ -27,14 +29,16 @@ from rosidl_typesupport_fastrtps_c.cli import GenerateFastRTPSCTypesupport
 from rosidl_typesupport_introspection_c.cli import GenerateIntrospectionCTypesupport
 
 _PREFIX = Path(sys.prefix)
-_PACKAGES = Path(sysconfig.get_path("purelib"))
-_INDEX = _PREFIX / "share/ament_index/resource_index"
+_INTO = Path(sys.argv[2]).resolve() if sys.argv[1:2] == ["--into"] else _PREFIX
+_PACKAGES = Path(sysconfig.get_path("purelib", vars={"base": str(_INTO)}))
+_INDEX = _INTO / "share/ament_index/resource_index"
 
 
 def main() -> None:
     # Where the generators look for their templates.
     os.environ["AMENT_PREFIX_PATH"] = str(_PREFIX)
-    manifests = {folder: ET.parse(folder / "package.xml").getroot() for folder in map(Path, sys.argv[1:])}  # noqa: S314
+    named = sys.argv[1:] if _INTO == _PREFIX else sys.argv[3:]
+    manifests = {folder: ET.parse(folder / "package.xml").getroot() for folder in map(Path, named)}  # noqa: S314
     folders = {manifest.findtext("name", "").strip(): folder.resolve() for folder, manifest in manifests.items()}
     needs = {name: _needs(manifest) & {*folders} for name, manifest in zip(folders, manifests.values(), strict=True)}
     for name in TopologicalSorter(needs).static_order():
@@ -61,7 +65,7 @@ def _generate(name: str, folder: Path, messages: Sequence[Path], output: Path) -
     for message in messages:
         convert_msg_to_idl(folder, name, message, output / "msg")
     sources = [f"{output}:{message.with_suffix('.idl')}" for message in messages]
-    share = [str(_PREFIX / "share")]
+    share = [str(prefix / "share") for prefix in dict.fromkeys([_INTO, _PREFIX])]
     # Fast DDS serializes by the one, and describes the type to its peers by the other.
     both = ["rosidl_typesupport_fastrtps_c", "rosidl_typesupport_introspection_c"]
     hashes = HashTypeDescription("hash").generate_type_hashes(name, sources, [*share, str(output.parent)], output)
@@ -75,7 +79,8 @@ def _generate(name: str, folder: Path, messages: Sequence[Path], output: Path) -
 def _compile(name: str, generated: Path) -> None:
     """Make the five libraries that ROS makes of a package, and the module that rclpy imports."""
     detail = generated / "msg/detail"
-    libraries = _PREFIX / "lib"
+    libraries = _INTO / "lib"
+    libraries.mkdir(parents=True, exist_ok=True)
     generator_c = libraries / f"lib{name}__rosidl_generator_c.so"
     fastrtps_c = libraries / f"lib{name}__rosidl_typesupport_fastrtps_c.so"
     introspection_c = libraries / f"lib{name}__rosidl_typesupport_introspection_c.so"
@@ -94,11 +99,14 @@ def _compile(name: str, generated: Path) -> None:
 
 def _link(generated: Path, sources: Iterable[Path], library: Path, needed: Sequence[Path]) -> None:
     ours = ("rosidl_*", "*__rosidl_generator_*", "*__rosidl_typesupport_*c", "fastcdr", "rmw", "rcutils")
-    there = sorted({file for pattern in ours for file in (_PREFIX / "lib").glob(f"lib{pattern}.so")} - {library})
+    prefixes = [_INTO, _PREFIX]
+    files = (file for prefix in prefixes for pattern in ours for file in (prefix / "lib").glob(f"lib{pattern}.so"))
+    there = sorted({*files} - {library})
+    headers = [prefix / "include" for prefix in prefixes if (prefix / "include").is_dir()]
     includes = [
         generated.parent,
-        _PREFIX / "include",
-        *(_PREFIX / "include").iterdir(),
+        *headers,
+        *(folder for each in headers for folder in each.iterdir()),
         sysconfig.get_path("include"),
         np.get_include(),
     ]
@@ -113,7 +121,7 @@ def _link(generated: Path, sources: Iterable[Path], library: Path, needed: Seque
 
 
 def _install(name: str, folder: Path, messages: Sequence[Path], generated: Path) -> None:
-    package, share = _PACKAGES / name, _PREFIX / "share" / name
+    package, share = _PACKAGES / name, _INTO / "share" / name
     (package / "msg").mkdir(parents=True, exist_ok=True)
     (package / "__init__.py").touch()
     for file in generated.glob("msg/*.py"):
@@ -122,11 +130,12 @@ def _install(name: str, folder: Path, messages: Sequence[Path], generated: Path)
     shutil.copytree(generated / "msg", share / "msg", ignore=_all_but(".idl", ".json"), dirs_exist_ok=True)
     for file in (*messages, Path("package.xml")):
         shutil.copy(folder / file, share / file)
-    headers = _PREFIX / "include" / name / name / "msg"
+    headers = _INTO / "include" / name / name / "msg"
     shutil.copytree(generated / "msg", headers, ignore=_all_but(".h", "detail"), dirs_exist_ok=True)
     listed = sorted(str(file) for message in messages for file in (message, message.with_suffix(".idl")))
-    (_INDEX / "rosidl_interfaces" / name).write_text("\n".join(listed))
-    (_INDEX / "packages" / name).touch()
+    for kind, content in (("rosidl_interfaces", "\n".join(listed)), ("packages", "")):
+        (_INDEX / kind).mkdir(parents=True, exist_ok=True)
+        (_INDEX / kind / name).write_text(content)
 
 
 def _all_but(*kept: str) -> Callable[[str, list[str]], list[str]]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from syncrelay.config.bundle import BundleKeys
 from syncrelay.config.document import Document, MappingNode, ScalarNode, SequenceNode
 from syncrelay.config.installed import installed_policies
 from syncrelay.config.keys import MOST
@@ -33,6 +34,7 @@ def check_groups(groups: Sequence[GroupConfig], document: Document) -> Iterator[
         yield from _restamp(group, document)
         yield from _trigger(group, document)
         yield from _clock(group, document)
+        yield from _bundle(group, document)
         yield from _device_clocks(group, document)
         yield from _times_of_arrival(group, document)
         yield from _keys(group, document)
@@ -127,6 +129,39 @@ def _clock(group: GroupConfig, document: Document) -> Iterator[Problem]:
             f" their ticks, write {'`queue_size: ' + str(needed) + '`' if needed <= MOST else 'a shorter max_wait'}"
         )
         yield document.problem(queue if document.has(queue) else wait, text, code="conflict")
+
+
+def _bundle(group: GroupConfig, document: Document) -> Iterator[Problem]:
+    """Yield sets that nothing leaves of, and inputs that a bundle cannot be told to hold."""
+    bundle, outputs = ((*group.path, key) for key in ("bundle", "outputs"))
+    if {bundle, outputs} & document.faulty:
+        return
+    if not group.options.outputs:
+        if group.bundle is None:
+            yield document.problem(outputs, "no set would leave: write a `bundle`, or remove this", code="conflict")
+        for output in ((*path, "output") for path, _ in group.paths() if document.has((*path, "output"))):
+            text = "this topic has no output of its own, as `outputs` is false: remove one of them"
+            yield document.problem(output, text, code="conflict")
+    if group.options.bundle is not None:
+        yield from _fields(group.options.bundle, group, document)
+        for path, topic in group.paths():
+            if topic.type is None and topic.topic and (*path, "type") not in document.faulty:
+                text = "write its `type` too: the fields of the `bundle` are found by it"
+                yield document.problem((*path, "topic"), text, code="missing")
+
+
+def _fields(bundle: BundleKeys, group: GroupConfig, document: Document) -> Iterator[Problem]:
+    """Yield fields for what is no input, and a second field for an input."""
+    fields, names = (*group.path, "bundle", "fields"), group.inputs.names
+    seen: dict[str, str] = {}
+    for field, topic in bundle.fields.items():
+        name = group.inputs.node.absolute(topic)
+        if name not in names:
+            text = f"{quoted(topic)} is not an input of this group{document.did_you_mean(name, names)}"
+            yield document.problem((*fields, field), text, code="no_such_input")
+        elif seen.setdefault(name, field) != field:
+            text = f"{quoted(topic)} is in `{seen[name]}` already: an input has one field"
+            yield document.problem((*fields, field), text, code="conflict")
 
 
 def _times_of_arrival(group: GroupConfig, document: Document) -> Iterator[Problem]:

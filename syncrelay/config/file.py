@@ -11,6 +11,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, create_model
 from pydantic.fields import FieldInfo
 
+from syncrelay.config.bundle import BundleKeys
 from syncrelay.config.export import ExportKeys, LerobotKeys
 from syncrelay.config.installed import NOT_SHARED, Policies, installed_policies, shared_keys, topic_model
 from syncrelay.config.keys import NOT_NULL, Keys
@@ -206,6 +207,7 @@ def relay_form() -> Form:
             "a group": known.any_group,
             "a topic": known.any_topic,
             "a topic's `qos`": QosOverrides,
+            "`bundle`": BundleKeys,
         },
         missing={
             "groups": "expected one group or more",

@@ -19,6 +19,8 @@ TIME: Final = "builtin_interfaces/msg/Time"
 _FIELD = re.compile(
     r"(?P<type>[A-Za-z][\w/]*)(?P<bound><=\d+)?(?P<array>\[[^\]]*\])?\s+(?P<name>[A-Za-z]\w*)\s*(?P<rest>.*)"
 )
+# What is before a comment. A default value may be a text with `#` in it.
+_CODE = re.compile(r"""(?:[^#"']|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')*""")
 PRIMITIVES: Final = frozenset(
     [
         "bool",
@@ -42,12 +44,37 @@ PRIMITIVES: Final = frozenset(
 _INDEX: Final = Path("share/ament_index/resource_index")
 
 
+ROSIDL: Final = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float", "float64": "double"}
+"""Names of primitives in .msg files, and in rosidl's Python classes where those are others."""
+
+
 class Field(NamedTuple):
-    """A field with its type in full (`float64`, `std_msgs/msg/Header`), and whether it is an array of that type."""
+    """A field with its type in full (`float64`, `std_msgs/msg/Header`), and what its definition says besides.
+
+    `bound` is that of a string (`<=10`), `array` is empty or as `[]`, `[3]` and `[<=3]`, `default` its default value.
+    """
 
     name: str
     type: str
-    is_array: bool
+    bound: str = ""
+    array: str = ""
+    default: str = ""
+
+    @property
+    def is_array(self) -> bool:
+        """Whether it is an array of its type."""
+        return bool(self.array)
+
+    @property
+    def rosidl(self) -> str:
+        """Its type as rosidl's classes name it, such as `sequence<builtin_interfaces/Time, 3>`."""
+        element = ROSIDL.get(self.type, self.type).replace("/msg/", "/")
+        if self.bound:
+            element += f"<{self.bound.removeprefix('<=')}>"
+        size = self.array.strip("[]")
+        if not self.array or size.isdigit():
+            return element + self.array
+        return f"sequence<{element}, {size.removeprefix('<=')}>" if size else f"sequence<{element}>"
 
 
 @dataclass(frozen=True)
@@ -92,6 +119,10 @@ class Interfaces:
             self._fields[type_name] = self._read_fields(type_name)
         return self._fields[type_name]
 
+    def fields_of(self, name: str) -> dict[str, str]:
+        """Return the fields of a type, named `pkg/Name`, and their types, as rosidl's classes have them."""
+        return {field.name: field.rosidl for field in self.fields(name.replace("/", "/msg/")) or ()}
+
     def _read_fields(self, type_name: str) -> tuple[Field, ...] | None:
         package = type_name.partition("/")[0]
         prefix = self.packages.get(package)
@@ -120,9 +151,11 @@ def parse_fields(text: str, *, package: str) -> tuple[Field, ...]:
     """Return the fields of a .msg file in order, without constants."""
     fields = []
     for line in text.splitlines():
-        found = _FIELD.match(line.partition("#")[0].strip())
+        code = _CODE.match(line)
+        found = _FIELD.match(code.group().strip() if code else "")
         if found is not None and not found["rest"].startswith("="):
-            fields.append(Field(found["name"], _full_name(found["type"], package), found["array"] is not None))
+            full, bound, array = _full_name(found["type"], package), found["bound"] or "", found["array"] or ""
+            fields.append(Field(found["name"], full, bound, array.replace(" ", ""), found["rest"].strip()))
     return tuple(fields)
 
 

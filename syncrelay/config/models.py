@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
+from syncrelay.config.bundle import BundleKeys
 from syncrelay.config.keys import (
     MOST,
     NOT_NULL,
@@ -322,6 +323,20 @@ class Group(Keys):
         description=(
             "Publish a small message for each set on ~/GROUP/sets, after the set's own: which messages belong together,"
             " which inputs are missing, span and latency; see docs/reference/manifest.md. Default: true."
+        ),
+    )
+    bundle: Annotated[BundleKeys | None, NOT_NULL] = Field(
+        default=None,
+        description=(
+            "Publish the whole set as one message too, in whose fields the messages of the set stand. Default: none."
+        ),
+        examples=[{"topic": "/front/set", "type": "realsense2_camera_msgs/msg/RGBD"}],
+    )
+    outputs: bool = Field(
+        default=True,
+        description=(
+            "Publish each message of a set on an output of its own. If false, sets leave as a `bundle` only."
+            " Default: true."
         ),
     )
     output_prefix: Annotated[OutputPrefix | None, NOT_NULL] = Field(

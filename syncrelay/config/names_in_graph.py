@@ -142,33 +142,35 @@ class _Graph:
 
     def __init__(self, file: NamesInFile, groups: Sequence[GroupConfig], resolve: Resolve) -> None:
         self._document, self._absolute, self._resolve = file.document, file.node.absolute, resolve
-        self._by_group = [[self._topic(topic, path) for path, topic in group.paths()] for group in groups]
+        self._by_group = [[self._topic(group, topic, path) for path, topic in group.paths()] for group in groups]
         self._topics = [topic for topics in self._by_group for topic in topics]
+        bundles = [(group.bundle.topic, (*group.path, "bundle", "topic")) for group in groups if group.bundle]
+        self._outputs = [topic.output for topic in self._topics if topic.output.text]
+        self._outputs += [self._name(topic, path) for topic, path in bundles]
         self._manifests = {group.name: self._manifest(group) for group in groups if group.options.manifest}
         self._own = {resolve(name): topic for name, topic in _own_topics(file, groups)}
 
     def problems(self) -> Iterator[Problem]:
         yield from self._shared_inputs()
-        yield from self._outputs()
-        for name in (name for topic in self._topics for name in (topic.input, topic.output)):
+        yield from self._meeting_outputs()
+        for name in (*(topic.input for topic in self._topics), *self._outputs):
             if name.excess:
                 yield self._problem(name.path, f"the full name {quoted(name.text)} {name.excess}", code="bad_value")
         for group, manifest in self._manifests.items():
             yield from self._misnamed_manifest(manifest)
             self._own.setdefault(manifest.text, _OwnTopic(MANIFEST_TYPE, f"the manifest of the group {group}"))
-        for topic in self._topics:
-            yield from self._meeting_own_topics(topic)
+        yield from self._meeting_own_topics()
 
     def _name(self, text: str, path: Path) -> _Name:
         before, after = self._absolute(text), self._resolve(text)
         return _Name(after, path, before if before != after else "")
 
-    def _topic(self, config: TopicConfig, path: Path) -> _Topic:
+    def _topic(self, group: GroupConfig, config: TopicConfig, path: Path) -> _Topic:
         topic, output, qos = ((*path, key) for key in ("topic", "output", "qos"))
         is_named = self._document.has(output)
         # A default output is known if what it is made of is.
         needed = output if is_named else (*path[:2], "output_prefix")
-        is_known = bool(config.topic or is_named) and needed not in self._document.faulty
+        is_known = bool(config.topic or is_named) and needed not in self._document.faulty and group.options.outputs
         written = output if is_named else topic
         return _Topic(
             path,
@@ -210,19 +212,19 @@ class _Graph:
                 )
                 yield self._problem(topic.qos, text, code="conflict")
 
-    def _outputs(self) -> Iterator[Problem]:
+    def _meeting_outputs(self) -> Iterator[Problem]:
         inputs = {topic.input.text: topic.input for topic in reversed(self._topics)}
         first: dict[str, _Name] = {}
-        for name in (topic.output for topic in self._topics if topic.output.text):
-            what = f"the {'' if name.path[-1] == 'output' else 'default '}output {name.said}"
+        for name in self._outputs:
+            what, key = _said_of_output(name)
             other = first.setdefault(name.text, name)
             if name.text in inputs:
                 line = self._line(inputs[name.text], beside=name.path)
-                text = f"{what} is also an input ({line}), which makes a loop: choose another `output`"
+                text = f"{what} is also an input ({line}), which makes a loop: choose another `{key}`"
                 yield self._problem(name.path, text, code="loop")
             elif other is not name:
                 line = self._line(other, beside=name.path)
-                text = f"{what} is already used on {line}: choose another `output`"
+                text = f"{what} is already used on {line}: choose another `{key}`"
                 yield self._problem(name.path, text, code="repeated_output")
 
     def _misnamed_manifest(self, name: _Name) -> Iterator[Problem]:
@@ -240,18 +242,26 @@ class _Graph:
                 text = f"{topic.input.said} is the manifest of a group of the same node, which makes a loop"
                 yield self._problem(topic.input.path, text, code="loop")
 
-    def _meeting_own_topics(self, topic: _Topic) -> Iterator[Problem]:
-        """Yield an output onto one of the node's own topics, or another type of one: DDS refuses both."""
-        if (taken := self._own.get(topic.output.text)) is not None:
-            text = (
-                f"the output {topic.output.said} is a topic that the node itself uses for {taken.purpose}:"
-                " choose another `output`"
-            )
-            yield self._problem(topic.output.path, text, code="own_topic")
-        taken = self._own.get(topic.input.text)
-        if taken is not None and topic.config.type not in (None, taken.type):
-            text = (
-                f"{topic.input.said} is a topic that the node itself uses for {taken.purpose}, with the type"
-                f" `{taken.type}`: a topic has only one type"
-            )
-            yield self._problem((*topic.path, "type"), text, code="conflict")
+    def _meeting_own_topics(self) -> Iterator[Problem]:
+        """Yield outputs onto the node's own topics, and other types of these: DDS refuses both."""
+        for name in self._outputs:
+            if (taken := self._own.get(name.text)) is not None:
+                what, key = _said_of_output(name)
+                what = what.removeprefix("the default ").removeprefix("the ")
+                text = f"the {what} is a topic that the node itself uses for {taken.purpose}: choose another `{key}`"
+                yield self._problem(name.path, text, code="own_topic")
+        for topic in self._topics:
+            taken = self._own.get(topic.input.text)
+            if taken is not None and topic.config.type not in (None, taken.type):
+                text = (
+                    f"{topic.input.said} is a topic that the node itself uses for {taken.purpose}, with the type"
+                    f" `{taken.type}`: a topic has only one type"
+                )
+                yield self._problem((*topic.path, "type"), text, code="conflict")
+
+
+def _said_of_output(name: _Name) -> tuple[str, str]:
+    """Return how a sentence about an output or a bundle begins, and the key that gives it another name."""
+    if "bundle" in name.path[2:]:
+        return f"the bundle {name.said}", "topic"
+    return f"the {'' if name.path[-1] == 'output' else 'default '}output {name.said}", "output"

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from syncrelay.clock import DeviceClock, Step
+from syncrelay.config.bundle import BundledInput, BundleKeys
 from syncrelay.config.file import FileKeys
 from syncrelay.config.listen import DEFAULT_HOST, DEFAULT_PORTS, Listen, parse_listen
 from syncrelay.config.models import Group, Inputs, PacedTopic, StampSource, Tolerance, Topic
@@ -17,7 +18,7 @@ from syncrelay.sync.transforms import Chains
 
 @dataclass(frozen=True, slots=True)
 class TopicConfig:
-    """An input and its output.
+    """An input and its output: that of its own, or the bundle's where there are no others.
 
     `type` is None where no group of the file says it: the graph or the recording does. `stamp` is "header", "receive"
     or a StampField with the path of the field; `key` the path of the field to match by, None where stamps are matched.
@@ -49,6 +50,16 @@ class TopicConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class BundleConfig:
+    """The message that holds a whole set. `fields` are those that the file names for each input, None for others."""
+
+    topic: str
+    type: str
+    fields: tuple[str | None, ...]
+    qos: QosPreset | QosOverrides
+
+
+@dataclass(frozen=True, slots=True)
 class GroupConfig:
     """A group. `restamp` is the engine's: None, one of Restamp, or an input's index.
 
@@ -62,6 +73,19 @@ class GroupConfig:
     trigger: int | None
     options: Group
     inputs: Inputs
+    bundle: BundleConfig | None = None
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The topics that its sets leave on, each once: the outputs of its inputs, and that of its bundle."""
+        bundle = () if self.bundle is None else (self.bundle.topic,)
+        return tuple(dict.fromkeys((*(topic.output for topic in self.topics), *bundle)))
+
+    def bundled(self) -> tuple[BundledInput, ...]:
+        """Return what its bundle is to hold. The file has the types of the inputs of a bundle."""
+        fields = (None,) * len(self.topics) if self.bundle is None else self.bundle.fields
+        rows = zip(self.topics, fields, strict=True)
+        return tuple(BundledInput(topic.topic, topic.type or "", field) for topic, field in rows)
 
     @property
     def path(self) -> Path:
@@ -149,15 +173,27 @@ def _group(name: str, group: Group, node: NodeConfig) -> GroupConfig:
         trigger=_index(group.trigger_topic, inputs),
         options=group,
         inputs=inputs,
+        bundle=_bundle(group.bundle, inputs),
     )
+
+
+def _bundle(bundle: BundleKeys | None, inputs: Inputs) -> BundleConfig | None:
+    if bundle is None:
+        return None
+    by_input = {inputs.node.absolute(topic): field for field, topic in bundle.fields.items()}
+    return BundleConfig(bundle.topic, bundle.type, tuple(by_input.get(name) for name in inputs.names), bundle.qos)
 
 
 def _topic(topic: Topic, group: Group, *, name: str) -> TopicConfig:
     output = default_output(topic.topic, group=name, prefix=group.output_prefix)
+    if topic.output is not None:
+        output = topic.output
+    if group.bundle is not None and not group.outputs:
+        output = group.bundle.topic
     return TopicConfig(
         topic=topic.topic,
         type=topic.type,
-        output=output if topic.output is None else topic.output,
+        output=output,
         qos=topic.qos,
         offset_ns=topic.offset,
         min_period_ns=topic.min_period if isinstance(topic, PacedTopic) else 0,

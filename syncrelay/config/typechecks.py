@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
+from syncrelay.config.bundle import BundleType
 from syncrelay.config.document import Document
 from syncrelay.config.interfaces import HEADER, PRIMITIVES, TIME, Field, Interfaces
 from syncrelay.config.models import StampField
@@ -59,6 +60,7 @@ class TypeChecks:
             yield from self._kinds_of_keys(group)
             yield from self._restamp(group)
             yield from self._transforms(group)
+            yield from self._bundle(group)
 
     def of_field(self, type_name: str, path: Path, steps: str, wanted: Wanted) -> Iterator[Problem]:
         """Yield what is wrong with the field that the file names at `path`; nothing of a type without its .msg file."""
@@ -154,6 +156,28 @@ class TypeChecks:
         if group.options.transforms is not None and not self._is_installed(TF_TYPE):
             text = f"{TF_TYPE} is not installed here, or not sourced, and the relay needs it for this: {TF_INSTALL}"
             yield self.document.problem(path, text, code="transforms_missing", severity=Severity.NOTE, subject=TF_TYPE)
+
+    def _bundle(self, group: GroupConfig) -> Iterator[Problem]:
+        path = (*group.path, "bundle")
+        keys = {(*group.path, "bundle"), (*group.path, "topics")} | {(*each, "type") for each, _ in group.paths()}
+        if group.bundle is None or keys & self.document.faulty or None in (topic.type for topic in group.topics):
+            return
+        type_name = group.bundle.type
+        if not self._is_installed(type_name):
+            yield self._not_installed(type_name, (*path, "type"))
+            return
+        if self.interfaces.fields(type_name) is None:
+            text = f"{quoted(type_name)} is installed without its .msg file, so its fields were not checked"
+            yield self.document.problem(
+                (*path, "type"), text, code="not_checked", severity=Severity.NOTE, subject=type_name
+            )
+            return
+        bundle = BundleType(type_name, self.interfaces.fields_of(type_name.replace("/msg/", "/")))
+        for number, field, why in bundle.place(group.bundled())[1]:
+            place = (*path, "type") if field is None else (*path, "fields", field)
+            span = None if field is None else self.document.key_span(place)
+            subject = str(group.topics[number].type)
+            yield self.document.problem(place, why, code="no_such_field", span=span, subject=subject)
 
     def _asked_fields(self, topic: TopicConfig, path: Path) -> Iterator[_WantedField]:
         """Yield the fields of its messages that the file names for a topic."""

@@ -3,7 +3,7 @@
 import logging
 from collections import deque
 from collections.abc import Callable, Hashable, Sequence
-from typing import Final, NamedTuple, Self, TypeAlias
+from typing import TYPE_CHECKING, Final, NamedTuple, Self, TypeAlias
 
 from syncrelay.cdr import read_stamp
 from syncrelay.config import GroupConfig
@@ -13,6 +13,9 @@ from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
 from syncrelay.explain import Code, RecentDrop, Stamps, Tape
 from syncrelay.runtime import SYSTEM, Runtime
 from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
+
+if TYPE_CHECKING:
+    from syncrelay.dataflow.bundle import BundleOutlet
 
 _LOG = logging.getLogger("syncrelay")
 
@@ -106,6 +109,8 @@ class Flow:
         """How many sets left: what manifests number them by."""
         self.unpublished = refusals.unpublished
         """The inputs of which the last message could not be published."""
+        self.bundle: BundleOutlet | None = None
+        """What publishes the sets as one message each."""
         self.tell: Callable[[Flow, Match, int], None] | None = None
         """Hears of each set that left, and of its latency in nanoseconds."""
         self._config = config
@@ -170,6 +175,8 @@ class Flow:
 
     def _send(self, match: Match) -> int:
         """Publish a set, and return when its newest message was received."""
+        if self.bundle is not None:
+            self.bundle.send(match, self.n_sets + 1)
         newest = 0
         for message in match.messages:
             if message is None:

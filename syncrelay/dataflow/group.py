@@ -10,6 +10,7 @@ from syncrelay.clock import Step
 from syncrelay.config import GroupConfig
 from syncrelay.config.installed import policy_name, suspects
 from syncrelay.dataflow.backend import Outlet
+from syncrelay.dataflow.bundle import Bundle, BundleOutlet
 from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
 from syncrelay.dataflow.flow import Engine, Flow, Refusals, Unpublished
 from syncrelay.dataflow.manifest_queue import GroupManifests
@@ -86,7 +87,8 @@ class GroupRelay:
         """Have `flow` make its flow, from what Flow takes but the runtime, which each backend has for itself."""
         self.config = config
         self._n_inputs = len(config.topics)
-        self.flow = flow(config, now=now, refusals=Refusals(config.name), tape=tape or Tape(runtime=runtime))
+        self._refusals = Refusals(config.name)
+        self.flow = flow(config, now=now, refusals=self._refusals, tape=tape or Tape(runtime=runtime))
         self.clocks = tuple(topic.device_clock(DeviceSteps(config.name, topic.topic).say) for topic in config.topics)
         """What maps the stamps of each input to the host's time; None where they are of it."""
         self.failure: str | None = None
@@ -129,6 +131,30 @@ class GroupRelay:
             self._manifests.publish_noted()
         self.flow.outlets[index] = outlet
         self.flow.restamped[index] = restamped
+
+    @property
+    def bundle_index(self) -> int:
+        """What stands for its bundles in `unpublished`, where inputs stand by their index."""
+        return self._n_inputs
+
+    def connect_bundle(self, bundle: Bundle, outlet: Outlet) -> None:
+        """Publish its sets as one message each too, through an outlet, from now on."""
+        if self._manifests is not None:
+            self._manifests.publish_noted()
+        is_alone = not self.config.options.outputs
+        self.flow.bundle = BundleOutlet(bundle, outlet, self._note_bundle, is_alone=is_alone)
+        if is_alone:
+            self.flow.restamped = list(bundle.restamped)
+
+    def disconnect_bundle(self) -> None:
+        """Publish no bundles from now on."""
+        self.flow.bundle = None
+
+    def _note_bundle(self, outlet: Outlet, why: str | None) -> None:
+        if why is not None:
+            self._refusals.refused(self.bundle_index, outlet, why)
+        elif self.unpublished:
+            self._refusals.accepted(self.bundle_index, outlet)
 
     def pause(self) -> None:
         """Let nothing leave until `unpause`; what is buffered, and what comes meanwhile, is dropped as `paused`."""

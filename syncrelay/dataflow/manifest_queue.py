@@ -6,7 +6,7 @@ of manifests costs far less than the same manifests one by one.
 
 import logging
 from collections import deque
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 from syncrelay.config.wording import counted
@@ -42,11 +42,22 @@ def _noted(flow: Flow, match: Match, latency: int, is_by_header: Sequence[bool])
             ]
         )
     received = [None if message is None else message.payload.received for message in match.messages]
-    sent = [0 if outlet is None else outlet.sent for outlet in flow.outlets]
+    sent, unpublished = _sent(flow, len(stamps))
+    return Note(flow.n_sets, latency, common, stamps, left_as, received, sent, unpublished)
+
+
+def _sent(flow: Flow, n_inputs: int) -> tuple[Sequence[int], Mapping[int, str]]:
+    """Return which message of its topic that of each input was, and why those that are 0 were not published."""
     unpublished = {index: each.why for index, each in flow.unpublished.items()}
+    bundle = flow.bundle
+    if bundle is not None and bundle.is_alone:
+        unpublished = dict.fromkeys(range(n_inputs), *unpublished.values()) if unpublished else {}
+        sent = [bundle.sent] * n_inputs
+    else:
+        sent = [0 if outlet is None else outlet.sent for outlet in flow.outlets]
     if unpublished:
         sent = [0 if index in unpublished else count for index, count in enumerate(sent)]
-    return Note(flow.n_sets, latency, common, stamps, left_as, received, sent, unpublished)
+    return sent, unpublished
 
 
 class GroupManifests:

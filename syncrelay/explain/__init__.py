@@ -22,6 +22,7 @@ from syncrelay.explain.facts import (
     Refusal,
     Sender,
     Standstill,
+    Unbundled,
 )
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.finding_log import FindingLog, in_words
@@ -85,6 +86,7 @@ __all__ = [
     "Tolerance",
     "Trouble",
     "TryBudget",
+    "Unbundled",
     "drop_fates",
     "explanation",
     "in_words",

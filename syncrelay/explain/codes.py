@@ -54,6 +54,7 @@ class Code(Enum):
     INACTIVE = "inactive", Of.NODE, _WARN
     PAUSED = "paused", Of.NODE, _WARN
     REFUSED_BY_DDS = "refused_by_dds", Of.NODE, _WARN_OR_ERROR
+    NO_BUNDLE = "no_bundle", Of.NODE, _WARN_OR_ERROR
     TYPE_NOT_IMPORTABLE = "type_not_importable", Of.GRAPH, _WARN_OR_ERROR
     OTHER_TYPE = "other_type", Of.GRAPH, _WARN_OR_ERROR
     SEVERAL_TYPES = "several_types", Of.GRAPH, _WARN_OR_ERROR

@@ -215,6 +215,13 @@ class ClockState(NamedTuple):
     stopped: int | None = None
 
 
+class Unbundled(NamedTuple):
+    """Why the sets of a group do not leave as one message each, and whether they leave in no other way."""
+
+    refusal: Refusal
+    is_alone: bool
+
+
 class Around(TypedDict, total=False):
     """The facts that no observation of a group's own messages gives; `GroupFacts` says what each is."""
 
@@ -230,6 +237,7 @@ class Around(TypedDict, total=False):
     is_discovering: bool
     inactive: str | None
     lapses: Sequence[Lapse]
+    unbundled: Unbundled | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -294,6 +302,8 @@ class GroupFacts:
     """The last sets that were given up because they could not be transformed."""
     inactive: str | None = None
     """The name of a managed node that waits to be activated."""
+    unbundled: Unbundled | None = None
+    """Why its sets do not leave as one message each, where they should."""
     standing: Standing = Standing.ENOUGH
     """How many of the possible sets leave."""
 

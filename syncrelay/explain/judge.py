@@ -37,6 +37,7 @@ _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     Rule(Code.INACTIVE, rules_graph.inactive),
     Rule(Code.PAUSED, rules_flow.paused),
     of_each_input(Code.REFUSED_BY_DDS, rules_graph.refused_by_dds),
+    Rule(Code.NO_BUNDLE, rules_graph.no_bundle),
     of_each_input(Code.TYPE_NOT_IMPORTABLE, rules_graph.type_not_importable),
     of_each_input(Code.OTHER_TYPE, rules_graph.other_type),
     of_each_input(Code.SEVERAL_TYPES, rules_graph.several_types),

@@ -57,6 +57,17 @@ def refused_by_dds(_facts: GroupFacts, _index: int, an_input: InputFacts) -> Fou
         )
 
 
+def no_bundle(facts: GroupFacts) -> Found:
+    """Find that the sets do not leave as one message each, as they should."""
+    if facts.unbundled is not None:
+        yield Fault(
+            facts.unbundled.refusal.text.splitlines()[0],
+            "build its package from the definitions that the inputs' publishers use, and source it where the relay"
+            " runs: it tries again every 5 s",
+            Severity.ERROR if facts.unbundled.is_alone else Severity.WARN,
+        )
+
+
 def type_not_importable(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find a type that cannot be used here, or not as the file asks."""
     severity = Severity.ERROR if an_input.required else Severity.WARN

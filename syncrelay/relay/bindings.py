@@ -15,6 +15,7 @@ from syncrelay.errors import ReloadError
 from syncrelay.explain import Endpoint
 from syncrelay.relay.entities import Entities, RefusedError
 from syncrelay.relay.inputs import InputBinding, TopicInput
+from syncrelay.relay.outputs import BundleOutput
 from syncrelay.relay.ports import Node, Publisher, Purpose
 from syncrelay.runtime import Runtime
 from syncrelay.sync import DropReason
@@ -25,10 +26,11 @@ _GRACE_S: Final = 2.0
 
 @dataclass(frozen=True, slots=True)
 class GroupBinding:
-    """A group and its inputs, each bound to the topic that feeds it."""
+    """A group and its inputs, each bound to the topic that feeds it; and its bundles, if it has any."""
 
     group: GroupRelay
     inputs: tuple[InputBinding, ...]
+    bundle: BundleOutput
 
     @property
     def waiting_for(self) -> str | None:
@@ -44,7 +46,8 @@ class GroupBinding:
     @property
     def publishers(self) -> list[Publisher]:
         """Those whose subscribers keep a lazy group awake. On the main thread."""
-        return [each.output.publisher for each in self.inputs if each.output.publisher is not None]
+        publishers = [*(each.output.publisher for each in self.inputs), self.bundle.publisher]
+        return [each for each in publishers if each is not None]
 
 
 class GroupBindings:
@@ -217,11 +220,12 @@ class GroupBindings:
         inputs = enumerate(self._topic(config, topics) for config in group.config.topics)
         if group.config.options.lazy and self._entities.purpose is Purpose.RELAY and not self._may_be_heard(group):
             group.sleep()
-        return GroupBinding(group, tuple(topic.bind(group, index) for index, topic in inputs))
+        bundle = BundleOutput()
+        return GroupBinding(group, tuple(topic.bind(group, index, bundle) for index, topic in inputs), bundle)
 
     def _may_be_heard(self, group: GroupRelay) -> bool:
         """Whether its topics have subscribers, of any QoS, as where a reload puts it in the place of another group."""
-        names = [topic.output for topic in group.config.topics]
+        names = [*group.config.outputs]
         if group.config.options.manifest:
             names.append(manifest_topic(group.config.name))
         return any(self._node.graph.subscribers_of(self._node.resolve_topic(name)) for name in names)

@@ -36,7 +36,7 @@ def _endpoints(
 ) -> tuple[Endpoint, ...]:
     return tuple(
         Endpoint(
-            _owner(info, kind),
+            owner(info, kind),
             printable(info.type),
             why(info.profile),
             is_named=info.is_named,
@@ -46,7 +46,8 @@ def _endpoints(
     )
 
 
-def _owner(info: EndpointInfo, kind: str) -> str:
+def owner(info: EndpointInfo, kind: str) -> str:
+    """Return the full name of the node that an endpoint belongs to, or what is known instead of this `kind` of it."""
     if not info.uses_ros:
         return f"a {kind} that uses DDS without ROS"
     return full_name(info.node_name, info.node_namespace) if info.is_named else f"a {kind} whose node is not known yet"

@@ -13,6 +13,7 @@ from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError
 from syncrelay.explain import Tape
 from syncrelay.relay.bindings import GroupBindings
+from syncrelay.relay.bundles import Bundles
 from syncrelay.relay.clock import WaitingClock
 from syncrelay.relay.manifests import Manifests
 from syncrelay.relay.ports import Node
@@ -37,6 +38,7 @@ class Groups:
         node: Node,
         bindings: GroupBindings,
         manifests: Manifests,
+        bundles: Bundles,
         loop: ReceiveLoop,
         transforms: TransformListener,
         clock: WaitingClock,
@@ -52,6 +54,7 @@ class Groups:
         self.config = config
         self.bindings = bindings
         self.manifests = manifests
+        self.bundles = bundles
         self.reloads = 0
         self.refused_reloads = 0
         self.reload_error: str | None = None
@@ -123,12 +126,14 @@ class Groups:
         self._loop.call(lambda: self.flush(DropReason.SHUTDOWN)).result()
         self.wait_until_acknowledged(patience_ns=patience_ns)
         self.bindings.end_publishers()
+        self.bundles.follow(())
         self.manifests.end_others(())
 
     def wait_until_acknowledged(self, *, patience_ns: int) -> None:
         """Give reliable subscribers so many nanoseconds to get what was published last."""
         deadline = self._runtime.monotonic_ns() + patience_ns
         self.bindings.wait_until_acknowledged(deadline)
+        self.bundles.wait_until_acknowledged(deadline)
         self.manifests.wait_until_acknowledged(deadline)
 
     def count_listeners(self) -> None:
@@ -140,6 +145,7 @@ class Groups:
         """Run no groups."""
         self.bindings.run(())
         self._transforms.serve(())
+        self.bundles.follow(())
         self.manifests.end_others(())
         self._loop.deadline = None
         self._changed(self.config)
@@ -169,9 +175,11 @@ class Groups:
             self.bindings.run(groups)
             return
         self.manifests.begin(groups)
+        self.bundles.begin(groups)
         try:
             self.bindings.run(groups)
         finally:
+            self.bundles.follow(self.bindings.all)
             self.manifests.end_others(self.bindings.groups)
         # DDS may make some only now that others are gone.
         self.manifests.begin(groups)

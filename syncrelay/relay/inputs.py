@@ -17,7 +17,7 @@ from syncrelay.errors import TypeImportError
 from syncrelay.explain import Endpoint, Refusal
 from syncrelay.relay.entities import Entities, RefusedError
 from syncrelay.relay.graph import as_publishers
-from syncrelay.relay.outputs import Output, Outputs, handler
+from syncrelay.relay.outputs import BundleOutput, Output, Outputs, handler
 from syncrelay.relay.ports import EndpointInfo, Entity, Graph, Publisher, RclError, Subscription
 from syncrelay.relay.types import SettlingType, import_type, name_of
 from syncrelay.runtime import Runtime
@@ -105,9 +105,9 @@ class TopicInput:
     def _publisher_words(self) -> str:
         return f"a publisher of {self.name}{f' ({self.type})' if self.type else ''}"
 
-    def bind(self, group: GroupRelay, index: int) -> "InputBinding":
+    def bind(self, group: GroupRelay, index: int, bundle: BundleOutput) -> "InputBinding":
         """Make ready to feed an input of a group; raises TypeImportError for a field that the type does not have."""
-        output = Output(group, index)
+        output = Output(group, index, bundle)
         if self._message_type is not None:
             output.handler = handler(group, index, self._message_type)
         return InputBinding(self, output)

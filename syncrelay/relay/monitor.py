@@ -213,6 +213,7 @@ class Monitor:
             empty_graph=None if all(each.publishers for each in shown) else self._empty_graph,
             inactive=self.inactive,
             lapses=batch.lapses,
+            unbundled=self._surroundings.unbundled(binding),
         )
         found = judge.judge(facts)
         self._reports[binding.group] = GroupReport(facts, found, batch.last)

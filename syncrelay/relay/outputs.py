@@ -16,14 +16,26 @@ from syncrelay.relay.types import begins_with_header, stamp_reader, value_reader
 from syncrelay.runtime import Runtime
 
 
+class BundleOutput:
+    """The bundles of a group on their way out: their publisher and its QoS, and why they cannot be published."""
+
+    __slots__ = ("profile", "publisher", "refusal")
+
+    def __init__(self) -> None:
+        self.publisher: Publisher | None = None
+        self.profile: Profile | None = None
+        self.refusal: Refusal | None = None
+
+
 class Output:
     """An input of a group on its way out: what handles its messages, and the publisher by which they leave."""
 
-    __slots__ = ("_outlet", "group", "handler", "index", "not_readable", "publisher", "refusal")
+    __slots__ = ("_outlet", "bundle", "group", "handler", "index", "not_readable", "publisher", "refusal")
 
-    def __init__(self, group: GroupRelay, index: int) -> None:
+    def __init__(self, group: GroupRelay, index: int, bundle: BundleOutput) -> None:
         self.group = group
         self.index = index
+        self.bundle = bundle
         self.handler: Deliver | None = None
         self.not_readable: str | None = None
         """Why the stamp or key that the file names cannot be read from messages of the type."""
@@ -36,6 +48,11 @@ class Output:
     def topic(self) -> str:
         """Where its messages leave, as the file has it."""
         return self.group.config.topics[self.index].output
+
+    @property
+    def is_separate(self) -> bool:
+        """Whether its messages leave on a topic of their own, and not only in bundles."""
+        return self.group.config.options.outputs
 
     def outlet(self, backend: RclBackend) -> Outlet:
         """Return the outlet of its publisher: the same for as long as that is, so that it counts what was sent."""
@@ -73,7 +90,7 @@ class Outputs:
 
     def make_publisher(self, output: Output, message_type: Any, profile: Profile) -> None:
         """Make the publisher of one that has none, unless nothing is to be published. Raises RefusedError."""
-        if self._publishes and output.publisher is None:
+        if self._publishes and output.is_separate and output.publisher is None:
             output.publisher = self._made(output, message_type, profile)
             output.refusal = None
 
@@ -82,6 +99,8 @@ class Outputs:
         made: dict[Output, Publisher] = {}
         refused = []
         for output in self.all if self._publishes else ():
+            if not output.is_separate:
+                continue
             try:
                 made[output] = self._made(output, message_type, profile)
             except RefusedError as error:

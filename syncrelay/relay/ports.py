@@ -38,6 +38,8 @@ class EndpointInfo(NamedTuple):
     """Whether it belongs to a node; what uses DDS alone has no name."""
     gid: bytes = b""
     """What tells it from all others: 16 bytes, as each of its messages has them. Empty where ROS does not say."""
+    type_hash: str = ""
+    """The hash of its type's definition (REP 2016), empty where ROS does not say."""
 
 
 class NodeName(NamedTuple):
@@ -196,6 +198,10 @@ class Node(Protocol):
 
     def publisher(self, message_type: Any, topic: str, profile: Profile) -> Publisher:
         """Make a publisher. Raises RclError."""
+        ...
+
+    def serialized(self, message: Any) -> bytes:
+        """Return an instance of a message class as it is published."""
         ...
 
     def end(self, entity: Any) -> None:

@@ -17,6 +17,7 @@ from syncrelay.errors import ReloadError, SyncRelayError
 from syncrelay.explain import GroupReport, Severity, Tape
 from syncrelay.logs import name_after
 from syncrelay.relay.bindings import GroupBindings
+from syncrelay.relay.bundles import Bundles
 from syncrelay.relay.clock import WaitingClock
 from syncrelay.relay.diagnostics import Reporters
 from syncrelay.relay.entities import Entities
@@ -121,6 +122,7 @@ class Relay:
             entities=entities, node=node, backend=backend, loop=self._loop, bugs=self._bugs, runtime=runtime
         )
         self._manifest_queue = manifests.queue
+        bundles = Bundles(entities=entities, node=node, backend=backend, loop=self._loop, runtime=runtime)
         self.taps = Taps(Tape(runtime=runtime), node.resolve_topic, runtime=runtime)
         """The clients that follow what leaves."""
         self._transforms = TransformListener(
@@ -136,6 +138,7 @@ class Relay:
             node=node,
             bindings=bindings,
             manifests=manifests,
+            bundles=bundles,
             loop=self._loop,
             transforms=self._transforms,
             clock=self._clock,
@@ -325,6 +328,9 @@ class Relay:
             if has_changed or topic.is_due:
                 with self._bugs.contained(f"polling {topic.name}"):
                     topic.poll()
+        if not self._groups.bindings.is_held:
+            with self._bugs.contained("polling the bundles"):
+                self._groups.bundles.follow(self._groups.bindings.all, has_changed=has_changed)
         if has_changed:
             self._surroundings.forget()
 

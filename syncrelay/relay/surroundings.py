@@ -4,9 +4,11 @@ from collections.abc import Hashable, Iterable, Sequence
 from typing import NamedTuple
 
 from syncrelay.config.wording import counted
+from syncrelay.dataflow.flow import Unpublished
 from syncrelay.dataflow.observers import Losses, Senders
-from syncrelay.explain import Endpoint, GraphSnapshot, InputGraph, Refusal
+from syncrelay.explain import Endpoint, GraphSnapshot, InputGraph, Refusal, Unbundled
 from syncrelay.relay import graph
+from syncrelay.relay.bindings import GroupBinding
 from syncrelay.relay.inputs import InputBinding
 from syncrelay.relay.ports import EndpointInfo, Node, Purpose
 from syncrelay.runtime import Runtime
@@ -81,9 +83,12 @@ class Surroundings:
 
     def _poll(self, binding: InputBinding) -> _Around:
         topic, output = binding.topic, self._node.resolve_topic(binding.output.topic)
+        publisher, profile = binding.output.publisher, topic.profile
+        if not binding.output.is_separate:
+            publisher, profile = binding.output.bundle.publisher, binding.output.bundle.profile
         publishers = self._graph.publishers_of(output)
         # A node that only observes does not count the relay itself as a rival.
-        own = int(binding.output.publisher is not None) if self._publishes else len(publishers)
+        own = int(publisher is not None) if self._publishes else len(publishers)
         rivals = graph.others(publishers, than=self._node.relay_name, own=own)
         if rivals:
             self._rivals_since.setdefault(binding, self._runtime.time_ns())
@@ -91,8 +96,8 @@ class Surroundings:
             self._rivals_since.pop(binding, None)
         return _Around(
             output=output,
-            subscribers=graph.as_subscribers(self._graph.subscribers_of(output), topic.profile)
-            if topic.profile is not None
+            subscribers=graph.as_subscribers(self._graph.subscribers_of(output), profile)
+            if profile is not None
             else (),
             rivals=rivals,
             alike=() if topic.publishers else self._alike(topic.name, topic.type),
@@ -112,11 +117,21 @@ class Surroundings:
             self._relayed[name] = any(graph.is_relayed(self._graph, each, name) for each in publishers)
         return self._relayed[name]
 
+    def unbundled(self, binding: GroupBinding) -> Unbundled | None:
+        """Return why the sets of a group do not leave as bundles, where they should."""
+        group, bundle = binding.group, binding.group.config.bundle
+        last = group.unpublished.get(group.bundle_index)
+        refusal = binding.bundle.refusal
+        if refusal is None and bundle is not None and last is not None:
+            refusal = _refused(last, self._node.resolve_topic(bundle.topic), bundle.type)
+        return None if refusal is None else Unbundled(refusal, is_alone=not group.config.options.outputs)
+
 
 def _unpublished(binding: InputBinding, output: str) -> Refusal | None:
-    """What rcl did not publish last."""
+    """Return why the last message of an input was not published."""
     last = binding.output.group.unpublished.get(binding.output.index)
-    if last is None:
-        return None
-    why = f"{last.why} ({counted(last.messages, 'message')} so far)"
-    return Refusal("publish", output, str(binding.topic.type), why=why)
+    return last and _refused(last, output, str(binding.topic.type))
+
+
+def _refused(last: Unpublished, output: str, type_name: str) -> Refusal:
+    return Refusal("publish", output, type_name, why=f"{last.why} ({counted(last.messages, 'message')} so far)")

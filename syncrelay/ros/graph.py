@@ -73,4 +73,5 @@ def _info(raw: Any) -> EndpointInfo:
         is_named=raw.node_name != _NAMELESS,
         uses_ros=raw.node_name != _WITHOUT_ROS,
         gid=bytes(raw.endpoint_gid[:GID_BYTES]),
+        type_hash=str(raw.topic_type_hash) if raw.topic_type_hash.version > 0 else "",
     )

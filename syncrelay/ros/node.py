@@ -11,6 +11,7 @@ from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.serialization import serialize_message
 from rclpy.task import Future as RosFuture
 from rosgraph_msgs.msg import Clock
 
@@ -134,6 +135,10 @@ class RosNode:
         except _rclpy.RCLError as error:
             raise RclError(str(error)) from error
         return RosPublisher(made)
+
+    def serialized(self, message: Any) -> bytes:
+        content: bytes = serialize_message(message)
+        return content
 
     def end(self, entity: Any) -> None:
         entity.release()

@@ -17,6 +17,7 @@ INTERFACES = {
     "diagnostic_msgs/msg/DiagnosticArray": "std_msgs/Header header\n",
     "dock_msgs/msg/Status": "uint8 level\nTrigger trigger\nstd_msgs/Header[] past\nstring<=10 name\n",
     "dock_msgs/msg/Trigger": "builtin_interfaces/Time time\nbuiltin_interfaces/Duration exposure\n",
+    "dock_msgs/msg/Stereo": "std_msgs/Header header\nsensor_msgs/Image a\nsensor_msgs/Image b\nuint32 number\n",
     "dock_msgs/msg/Headers": "std_msgs/Header[] headers\n",
     "dock_msgs/action/Dock": "---\n---\n",
 }

@@ -76,18 +76,18 @@ def test_fields_are_read_as_the_interface_definition_says():
         other/msg/Full full
         float64[9] fixed
         string<=10[<=5] bounded
-        string<=10 word "default"
+        string<=10 word "default # 1"  # and more
         int32 number 5
         uint8[] values [1, 2]
 
     """
     assert parse_fields(text, package="mine") == (
-        Field("header", "std_msgs/msg/Header", is_array=False),
-        Field("local", "mine/msg/Local", is_array=False),
-        Field("full", "other/msg/Full", is_array=False),
-        Field("fixed", "float64", is_array=True),
-        Field("bounded", "string", is_array=True),
-        Field("word", "string", is_array=False),
-        Field("number", "int32", is_array=False),
-        Field("values", "uint8", is_array=True),
+        Field("header", "std_msgs/msg/Header"),
+        Field("local", "mine/msg/Local"),
+        Field("full", "other/msg/Full"),
+        Field("fixed", "float64", array="[9]"),
+        Field("bounded", "string", bound="<=10", array="[<=5]"),
+        Field("word", "string", bound="<=10", default='"default # 1"'),
+        Field("number", "int32", default="5"),
+        Field("values", "uint8", array="[]", default="[1, 2]"),
     )

@@ -93,6 +93,10 @@ def outputs(config: Config) -> object:
     return [topic.output for group in config.groups for topic in group.topics]
 
 
+def of_bundle(config: Config) -> object:
+    return config.groups[0].bundle
+
+
 def own_topics(config: Config) -> object:
     """The names that the node must have for itself."""
     return config.names.written
@@ -142,6 +146,7 @@ def of_node(name: str, value: object) -> Row:
 
 
 WITH_OPTIONAL = {**EXACT, "topics": [{"topic": "/a", "type": IMAGE, **OPTIONAL}, {"topic": "/b", "type": IMAGE}]}
+BUNDLE = {"topic": "/set", "type": "dock_msgs/msg/Stereo"}
 BY_B = {**LATEST, "trigger": "/b", "max_age": "1s"}
 
 OPTIONS: dict[str, Row] = {
@@ -178,6 +183,13 @@ OPTIONS: dict[str, Row] = {
     "target": of_group(sets_with_transforms(50), EXACT, transforms=({"target": "base"}, {"target": "map"})),
     "wait": of_group(
         sets_with_transforms(150), EXACT, transforms=({"target": "base"}, {"target": "base", "wait": "200ms"})
+    ),
+    "bundle": of_group(lambda config: config.groups[0].outputs, bundle=BUNDLE),
+    "fields": of_group(of_bundle, bundle=(BUNDLE, {**BUNDLE, "fields": {"a": "/b"}})),
+    "outputs": (
+        file({**APPROXIMATE, "bundle": BUNDLE}),
+        file({**APPROXIMATE, "bundle": BUNDLE, "outputs": False}),
+        outputs,
     ),
     "lazy": of_group(lambda config: config.groups[0].options.lazy, lazy=True),
     "manifest": of_group(own_topics, manifest=False),

@@ -182,6 +182,9 @@ class SimulatedNode:
 
         return end
 
+    def serialized(self, message: Any) -> bytes:
+        return bytes(serialize_message(message))
+
     def resolve_topic(self, name: str) -> str:
         return self._resolved(name)
 

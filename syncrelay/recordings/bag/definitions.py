@@ -14,6 +14,7 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 from rosbags.typesys.store import Typestore
 
 from syncrelay.cdr_walk import FieldsOf
+from syncrelay.config.interfaces import ROSIDL
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag.plain_definitions import plain_idl, plain_msg
 from syncrelay.recordings.bag.recording import Channel, Definition
@@ -28,8 +29,6 @@ _MOST_FIELDS: Final = 20_000
 _DEEPEST: Final = 50
 # A gibibyte of doubles.
 _LONGEST_ARRAY: Final = 1 << 27
-# Names of primitives in .msg files, and in rosidl's Python classes.
-_ROSIDL: Final = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float", "float64": "double"}
 
 
 def typestore(type_name: str, definition: Definition | None) -> Typestore | None:
@@ -178,7 +177,7 @@ def _rosidl_type(description: Any) -> str:
     kind, what = description
     if kind == Nodetype.BASE:
         name, bound = what
-        return f"{_ROSIDL.get(name, name)}<{bound}>" if bound else _ROSIDL.get(name, name)
+        return f"{ROSIDL.get(name, name)}<{bound}>" if bound else ROSIDL.get(name, name)
     if kind == Nodetype.NAME:
         return str(what).replace("/msg/", "/")
     element, count = what

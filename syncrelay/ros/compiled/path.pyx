@@ -842,7 +842,7 @@ cdef class Deliver:
 cdef class Flow:
     """As dataflow.flow.Flow."""
 
-    cdef public object engine, tell
+    cdef public object engine, tell, bundle
     cdef public list outlets, restamped, keys
     cdef readonly object last
     cdef readonly int64_t n_sets
@@ -852,7 +852,7 @@ cdef class Flow:
 
     def __init__(self, config, *, now, refusals, tape):
         n_inputs = len(config.topics)
-        self.engine, self.tell, self.n_sets = config.engine(), None, 0
+        self.engine, self.tell, self.bundle, self.n_sets = config.engine(), None, None, 0
         self._config, self._tape = config, tape
         self._refusals, self.unpublished = refusals, refusals.unpublished
         self.outlets, self.restamped, self.keys = [None] * n_inputs, [False] * n_inputs, [None] * n_inputs
@@ -926,6 +926,8 @@ cdef class Flow:
 
     cdef object _send(self, match):
         """Publish a set; when its newest message was received."""
+        if self.bundle is not None:
+            self.bundle.send(match, self.n_sets + 1)
         newest = 0
         common = match.stamp
         for message in match.messages:

@@ -1,6 +1,6 @@
 """What the graph tells: facts that come to a finding, and the nearest that do not."""
 
-from syncrelay.explain import ClockState, Code, Endpoint, GraphSnapshot, Mismatch, Refusal
+from syncrelay.explain import ClockState, Code, Endpoint, GraphSnapshot, Mismatch, Refusal, Unbundled
 from syncrelay.sync.counts import InputCounts
 from tests.explain.support.cases import AGES, HALF_A_SECOND, LIDAR, ONCE, QUIET, STRANGER, UNFIT, camera
 from tests.explain.support.groups import IMAGE, NOW, S, a_group, a_silent_group, an_input
@@ -28,6 +28,14 @@ FOUND = {
     ),
     "an optional input that the relay cannot subscribe to": a_group(
         camera(required=False, refusal=Refusal("subscribe to", "/camera", IMAGE, why="out of memory")), LIDAR
+    ),
+    "bundles whose package is not there, and nothing else leaves": a_group(
+        unbundled=Unbundled(
+            Refusal("publish", "/set", "rig_msgs/msg/Set", why="No module named 'rig_msgs'\nand more"), is_alone=True
+        )
+    ),
+    "bundles that cannot be made, beside the outputs": a_group(
+        unbundled=Unbundled(Refusal("publish", "/set", "rig_msgs/msg/Set", why="rgb is cut off"), is_alone=False)
     ),
     "a type that is not installed": a_group(camera(not_importable="no package fancy_msgs\nand more"), LIDAR),
     "a field that the type does not have": a_group(

@@ -1,0 +1,102 @@
+"""Bundles as flows publish them: on both paths alike, once a set, with all that is said of it."""
+
+import struct
+from types import SimpleNamespace
+
+import pytest
+
+from syncrelay.cdr_assembly import ENCAPSULATION
+from syncrelay.config import load_text
+from syncrelay.dataflow.backend import PublishError
+from syncrelay.dataflow.bundle import Bundle, BundleError
+from syncrelay.dataflow.group import GroupRelay
+from tests.dataflow.payloads import FLOWS, Outlet
+from tests.ros.cdr_messages import VECTOR, vector
+from tests.ros.configs import config, inputs
+from tests.ros.streams import BEGIN, MS
+
+_HEADER = {"stamp": "builtin_interfaces/Time", "frame_id": "string"}
+_TYPES = {
+    "rig_msgs/Set": {
+        "number": "uint64",
+        "left": "geometry_msgs/Vector3Stamped",
+        "right": "geometry_msgs/Vector3Stamped",
+        "missing": "sequence<string>",
+        "stamps": "sequence<builtin_interfaces/Time>",
+        "header": "std_msgs/Header",
+    },
+    "geometry_msgs/Vector3Stamped": {"header": "std_msgs/Header", "vector": "geometry_msgs/Vector3"},
+    "geometry_msgs/Vector3": {"x": "double", "y": "double", "z": "double"},
+    "std_msgs/Header": _HEADER,
+    "builtin_interfaces/Time": {"sec": "int32", "nanosec": "uint32"},
+}
+_DEFAULT = (
+    ENCAPSULATION + bytes(8) + struct.pack("<iIIB3x24x", 0, 0, 1, 0) * 2 + struct.pack("<IIiIIB", 0, 0, 0, 0, 1, 0)
+)
+
+
+def _group(flow, **keys) -> GroupRelay:
+    topics = [*inputs({"/left": VECTOR}), *inputs({"/right": VECTOR}, required=False)]
+    bundle = {"topic": "/set", "type": "rig_msgs/msg/Set"}
+    base = {"policy": "exact_time", "max_wait": "1s", "bundle": bundle, "outputs": False, "topics": topics}
+    return GroupRelay(load_text(config({"front": {**base, **keys}})).groups[0], now=lambda: 0, flow=flow)
+
+
+def _bundle(group: GroupRelay) -> Bundle:
+    return Bundle(group.config, _TYPES.__getitem__, _DEFAULT)
+
+
+def _payload(content: bytes):
+    return SimpleNamespace(content=lambda: content, received=BEGIN)
+
+
+def _whole(number: int, left: bytes, right: bytes, missing: bytes, *stamps: int) -> bytes:
+    """The bundle of vectors without a frame."""
+    times = b"".join(struct.pack("<iI", *divmod(stamp, 10**9)) for stamp in stamps)
+    header = struct.pack("<iIIB", *divmod(max(stamps), 10**9), 1, 0)
+    return ENCAPSULATION + struct.pack("<Q", number) + left + right + missing + struct.pack("<I", 2) + times + header
+
+
+@pytest.mark.parametrize("flow", FLOWS)
+def test_each_set_is_published_once_with_its_number_and_what_is_missing(flow):
+    group, outlet = _group(flow), Outlet()
+    group.connect_bundle(_bundle(group), outlet)
+    first, second = vector(BEGIN, frame_id=""), vector(BEGIN + MS, frame_id="")
+    for index in (0, 1):
+        group.flow.receive(index, _payload(first), BEGIN)
+    group.flow.receive(0, _payload(second), BEGIN + MS)
+    group.expire(10**10)
+    # Vectors without a frame take 40 bytes wherever they stand.
+    empty = struct.pack("<iIIB3x24x", 0, 0, 1, 0)
+    none, right = struct.pack("<I", 0), struct.pack("<II6s2x", 1, 6, b"right\0")
+    assert outlet.log == [
+        _whole(1, first[4:], first[4:], none, BEGIN, BEGIN),
+        _whole(2, second[4:], empty, right, BEGIN + MS, 0),
+    ]
+
+
+@pytest.mark.parametrize("flow", FLOWS)
+def test_what_cannot_be_bundled_is_told_until_a_set_leaves_again(flow):
+    group, outlet = _group(flow), Outlet()
+    group.connect_bundle(_bundle(group), outlet)
+    good = vector(BEGIN)
+    for stamp, content, refusal in (
+        (BEGIN, good[:-1], None),
+        (BEGIN + MS, good, PublishError("no room")),
+    ):
+        outlet.refusal = refusal
+        for index in (0, 1):
+            group.flow.receive(index, _payload(content), stamp)
+    assert group.unpublished[group.bundle_index] == (2, "no room")
+    outlet.refusal = None
+    for index in (0, 1):
+        group.flow.receive(index, _payload(good), BEGIN + 2 * MS)
+    assert not group.unpublished
+    assert (group.flow.n_sets, outlet.sent, group.failure) == (3, 1, None)
+
+
+def test_an_input_without_a_field_is_refused():
+    group = _group(FLOWS[0])
+    types = {**_TYPES, "rig_msgs/Set": {"left": "geometry_msgs/Vector3Stamped"}}
+    with pytest.raises(BundleError, match="rig_msgs/msg/Set has too few fields of geometry_msgs/msg/Vector3Stamped"):
+        Bundle(group.config, types.__getitem__, _DEFAULT)

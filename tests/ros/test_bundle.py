@@ -1,0 +1,210 @@
+"""Sets as one message each, over DDS, of a type that is only known from a package that was built here."""
+
+import re
+from typing import Any
+
+import pytest
+
+from tests.ros.cdr_messages import VECTOR, stamp_of, vector
+from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
+from tests.ros.frames import Frame
+from tests.ros.made_messages import MadeMessages, made
+from tests.ros.manifests import MANIFEST_TYPE, Told, read
+from tests.ros.relaying import play_until_out
+from tests.ros.stage import Collector, Stage, both_backends
+from tests.ros.status import ANY_PORT, groups_of, wait_for_finding
+from tests.ros.streams import BEGIN, MS
+
+pytestmark = pytest.mark.ros
+
+_PAIR = "made_sets/msg/Pair"
+_DEFINITIONS = {
+    _PAIR: """\
+bool flag true
+std_msgs/Header header
+uint32 number
+string[] missing
+builtin_interfaces/Time[] stamps
+geometry_msgs/Vector3Stamped left
+uint8 between 7
+geometry_msgs/Vector3Stamped right
+geometry_msgs/Quaternion rotation
+""",
+}
+_OWN, _HOLDER = "made_own/msg/Own", "made_own/msg/Holder"
+_HOLDING_OWN = {
+    _OWN: "std_msgs/Header header\nfloat64 value\n",
+    _HOLDER: "made_own/Own own\ngeometry_msgs/Vector3Stamped left\n",
+}
+_TOPICS = {"/rig/left": VECTOR, "/rig/right": VECTOR}
+_BUNDLE = {"topic": "/front/set", "type": _PAIR}
+_PERIOD = 100 * MS
+_MANIFEST = "/syncrelay/front/sets"
+
+
+@pytest.fixture(scope="session")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> MadeMessages:
+    return made(tmp_path_factory.getbasetemp().parent, _DEFINITIONS)
+
+
+@pytest.fixture
+def sourced(stage: Stage, pair: MadeMessages) -> Stage:
+    """A stage on which every process has the package sourced."""
+    stage.environment = pair.sourced(stage.environment)
+    return stage
+
+
+def _group(**keys: Any) -> dict[str, Any]:
+    left, right = _TOPICS
+    topics = [
+        *inputs({left: VECTOR}, qos=LOSSLESS),
+        *inputs({right: VECTOR}, qos=LOSSLESS, required=False),
+    ]
+    base = {"policy": "approximate_time", "slop": "20ms", "max_wait": "10min", "queue_size": ROOMY, "bundle": _BUNDLE}
+    return {**base, "topics": topics, **keys}
+
+
+def _is_missing(number: int) -> bool:
+    return number % 3 == 1
+
+
+def _frames(number: int) -> list[Frame]:
+    """A set by its number; a third has no message of the right."""
+    began = BEGIN + number * _PERIOD
+    left = Frame("/rig/left", VECTOR, 0, vector(began, frame_id="l" * (number % 7)))
+    right = Frame("/rig/right", VECTOR, 0, vector(began + 3 * MS, frame_id="r" * (number % 5), little_endian=False))
+    return [left] if _is_missing(number) else [left, right]
+
+
+def _connected(stage: Stage, collector: Collector, *topics: str) -> tuple[Any, int]:
+    """The player, and the number of the next set to play, once a set has come out."""
+    player, numbers = stage.player(_TOPICS), iter(range(0, 300, 3))
+    play_until_out(player, collector, (_frames(number) for number in numbers), topics)
+    return player, next(numbers)
+
+
+def _require_whole(pair: MadeMessages, payload: bytes, *, restamped: bool = False) -> int:
+    """Check all of a bundle; its number among those that were played."""
+    found = pair.decode(payload, _PAIR)
+    stamp = found.left.header.stamp
+    played = (stamp.sec * 10**9 + stamp.nanosec - BEGIN - (3 * MS if restamped else 0)) // _PERIOD
+    sent = {frame.topic: frame.payload for frame in _frames(played)}
+    left = pair.decode(sent["/rig/left"], VECTOR)
+    right = pair.decode(sent.get("/rig/right", vector(0, frame_id="")), VECTOR)
+    latest = max(map(stamp_of, sent.values()))
+    assert (found.left.header.frame_id, found.left.vector) == (left.header.frame_id, left.vector)
+    if _is_missing(played):
+        zero = pair.store.types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
+        assert (found.missing, found.right.header.frame_id, found.right.vector) == (["right"], "", zero)
+    else:
+        assert (found.missing, found.right.header.frame_id) == ([], right.header.frame_id)
+        assert found.right.vector == right.vector
+    stamps = [each.sec * 10**9 + each.nanosec for each in found.stamps]
+    assert stamps == [stamp_of(sent[topic]) if topic in sent else 0 for topic in _TOPICS]
+    assert found.header.stamp.sec * 10**9 + found.header.stamp.nanosec == latest
+    assert (found.flag, found.between, found.rotation.w, found.header.frame_id) == (True, 7, 1.0, "")
+    return played
+
+
+@both_backends
+def test_each_set_leaves_as_one_message_with_all_that_is_said_of_it(sourced: Stage, pair: MadeMessages):
+    sourced.relay(config({"front": _group(outputs=False)}))
+    collector = sourced.collector({"/front/set": _PAIR, _MANIFEST: MANIFEST_TYPE})
+    player, first = _connected(sourced, collector, "/front/set", _MANIFEST)
+    before = collector.count("/front/set")
+    frames = [frame for number in range(first, first + 301) for frame in _frames(number)]
+    player.play(frames, speed=1e9)
+    payloads = collector.wait_for("/front/set", before + 300)
+    played = [_require_whole(pair, payload) for payload in payloads]
+    assert played[before : before + 300] == list(range(first, first + 300))
+    numbers = [pair.decode(payload, _PAIR).number for payload in payloads]
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    assert collector.endpoints("/front/rig/left", kind="publisher") == []
+    collector.process.wait_until(lambda: _last_told(collector).number >= numbers[-1], "the last manifest")
+    told = _last_told(collector)
+    assert {each.output for each in told.inputs} == {"/front/set"}
+    assert {each.sequence for each in told.inputs if each.sequence is not None} == {told.number}
+
+
+def _last_told(collector: Collector) -> Told:
+    return read(collector.payloads(_MANIFEST)[-1])
+
+
+@both_backends
+def test_a_common_stamp_is_in_the_members_too_and_outputs_are_left_as_they_were(sourced: Stage, pair: MadeMessages):
+    sourced.relay(config({"front": _group(restamp="latest")}))
+    topics = {"/front/set": _PAIR, "/front/rig/left": VECTOR}
+    collector = sourced.collector(topics)
+    player, first = _connected(sourced, collector, *topics)
+    before = [collector.count(topic) for topic in topics]
+    player.play([frame for number in range(first, first + 31) for frame in _frames(number)], speed=1e9)
+    bundles, lefts = (
+        collector.wait_for(topic, count + 30)[count : count + 30] for topic, count in zip(topics, before, strict=True)
+    )
+    for number, bundle, left in zip(range(first, first + 30), bundles, lefts, strict=True):
+        latest = max(stamp_of(frame.payload) for frame in _frames(number))
+        found = pair.decode(bundle, _PAIR)
+        stamps = [found.header.stamp, found.left.header.stamp]
+        stamps += [] if _is_missing(number) else [found.right.header.stamp]
+        assert {stamp.sec * 10**9 + stamp.nanosec for stamp in stamps} == {latest}
+        assert stamp_of(left) == latest
+        assert pair.store.serialize_cdr(found.left, VECTOR) == pair.store.serialize_cdr(
+            pair.store.deserialize_cdr(left, VECTOR), VECTOR
+        )
+
+
+def test_a_reload_leaves_the_bundles_publisher_as_it_is_and_a_lazy_group_wakes_for_it(
+    sourced: Stage, pair: MadeMessages
+):
+    lazy = {"front": _group(outputs=False, lazy=True, manifest=False)}
+    relay = sourced.relay(config(lazy, metrics=ANY_PORT))
+    player = sourced.player(_TOPICS)
+    player.is_up()
+    wait_for_finding(relay, "nobody_listens", naming=["/front/set"])
+    collector = sourced.collector({"/front/set": _PAIR})
+    numbers = iter(range(0, 300, 3))
+    play_until_out(player, collector, (_frames(number) for number in numbers), ["/front/set"])
+    (before,) = collector.endpoints("/front/set", kind="publisher")
+    lazy["front"]["slop"] = "19ms"
+    (sourced.folder / "config-0.yaml").write_text(config(lazy, metrics=ANY_PORT))
+    assert sourced.caller().call("reload") == (True, "reloaded: 0 groups unchanged; rebuilt front")
+    count, first = collector.count("/front/set"), next(numbers)
+    player.play([frame for number in range(first, first + 31) for frame in _frames(number)], speed=1e9)
+    played = [
+        _require_whole(pair, payload) for payload in collector.wait_for("/front/set", count + 30)[count : count + 30]
+    ]
+    assert played == list(range(first, first + 30))
+    assert collector.endpoints("/front/set", kind="publisher") == [before]
+    group = groups_of(relay)["front"]
+    assert [each["output"] for each in group["inputs"]] == ["/front/set", "/front/set"]
+    assert [[one["node"] for one in each["subscribers"]] for each in group["inputs"]] == [["/collector"]] * 2
+
+
+def test_a_type_that_is_not_there_is_said(stage: Stage):
+    relay = stage.relay(config({"front": _group(outputs=False)}, metrics=ANY_PORT))
+    player = stage.player(_TOPICS)
+    player.is_up()
+    found = wait_for_finding(relay, "no_bundle", naming=["made_sets/msg/Pair cannot be imported", "/front/set"])
+    assert found["severity"] == "error"
+
+
+def test_messages_of_another_definition_than_the_bundles_are_refused_with_both(
+    stage: Stage, tmp_path_factory: pytest.TempPathFactory
+):
+    folder = tmp_path_factory.getbasetemp().parent
+    ours = made(folder, _HOLDING_OWN)
+    theirs = made(folder, {**_HOLDING_OWN, _OWN: _HOLDING_OWN[_OWN] + "uint8 more\n"})
+    plain = stage.environment
+    stage.environment = theirs.sourced(plain)
+    player = stage.player({"/own": _OWN, "/rig/left": VECTOR}, node="camera")
+    stage.environment = ours.sourced(plain)
+    group = {
+        "policy": "approximate_time",
+        "slop": "20ms",
+        "bundle": {"topic": "/set", "type": _HOLDER},
+        "topics": inputs({"/own": _OWN, "/rig/left": VECTOR}),
+    }
+    relay = stage.relay(config({"front": group}, metrics=ANY_PORT))
+    player.is_up()
+    found = wait_for_finding(relay, "no_bundle", naming=["/camera publishes /own", _HOLDER, ", here RIHS01_"])
+    assert len(set(re.findall(r"RIHS01_[0-9a-f]{64}", found["text"]))) == 2
