@@ -41,6 +41,7 @@ PRIMITIVES: Final = frozenset(
     ]
 )
 
+_RULE: Final = "=" * 80 + "\n"
 _INDEX: Final = Path("share/ament_index/resource_index")
 
 
@@ -123,16 +124,36 @@ class Interfaces:
         """Return the fields of a type, named `pkg/Name`, and their types, as rosidl's classes have them."""
         return {field.name: field.rosidl for field in self.fields(name.replace("/", "/msg/")) or ()}
 
+    def definition(self, type_name: str) -> str | None:
+        """Return the .msg file of a type with those of all types within it, as recordings hold them.
+
+        None where one of the files cannot be read.
+        """
+        texts: dict[str, str] = {}
+        waiting = [type_name]
+        while waiting:
+            name = waiting.pop()
+            text = self._text(name)
+            if text is None:
+                return None
+            texts[name] = text
+            below = [field.type for field in self.fields(name) or () if field.type not in PRIMITIVES]
+            waiting += [each for each in dict.fromkeys(below) if each not in texts and each not in waiting]
+        others = [f"{_RULE}MSG: {name.replace('/msg/', '/')}\n{text}" for name, text in texts.items()][1:]
+        return "\n".join([texts[type_name], *others])
+
     def _read_fields(self, type_name: str) -> tuple[Field, ...] | None:
-        package = type_name.partition("/")[0]
-        prefix = self.packages.get(package)
+        text = self._text(type_name)
+        return None if text is None else parse_fields(text, package=type_name.partition("/")[0])
+
+    def _text(self, type_name: str) -> str | None:
+        prefix = self.packages.get(type_name.partition("/")[0])
         if prefix is None:
             return None
         try:
-            text = (prefix / "share" / f"{type_name}.msg").read_text(encoding="utf-8", errors="replace")
+            return (prefix / "share" / f"{type_name}.msg").read_text(encoding="utf-8", errors="replace")
         except OSError:
             return None
-        return parse_fields(text, package=package)
 
     def _resources(self, kind: str) -> dict[str, Path]:
         found: dict[str, Path] = {}

@@ -1,6 +1,9 @@
 """An ament index made by hand: a few interfaces, and one of everything that goes wrong with types."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+
+_INDEX = "share/ament_index/resource_index"
 
 INTERFACES = {
     "builtin_interfaces/msg/Time": "int32 sec\nuint32 nanosec\n",
@@ -31,21 +34,27 @@ PACKAGES_WITHOUT_INTERFACES = ("rclpy",)
 
 def make_index(prefix: Path) -> Path:
     """Write the index below a prefix and return the prefix."""
-    index = prefix / "share/ament_index/resource_index"
+    write_index(prefix, INTERFACES, WITHOUT_DEFINITION)
+    for package in PACKAGES_WITHOUT_INTERFACES:
+        _resource(prefix / _INDEX / "packages" / package, "")
+    return prefix
+
+
+def write_index(prefix: Path, interfaces: Mapping[str, str], without_definition: Sequence[str] = ()) -> Path:
+    """Write an index of types, with their definitions or without, below a prefix and return the prefix."""
     listed: dict[str, list[str]] = {}
-    for name, text in INTERFACES.items():
+    for name, text in interfaces.items():
         package, kind, _ = name.split("/")
         listed.setdefault(package, []).append(f"{name.removeprefix(f'{package}/')}.{kind}")
         definition = prefix / "share" / f"{name}.{kind}"
         definition.parent.mkdir(parents=True, exist_ok=True)
         definition.write_text(text)
-    for name in WITHOUT_DEFINITION:
+    for name in without_definition:
         package = name.partition("/")[0]
         listed.setdefault(package, []).append(f"{name.removeprefix(f'{package}/')}.idl")
     for package, files in listed.items():
-        _resource(index / "rosidl_interfaces" / package, "\n".join(files))
-    for package in (*listed, *PACKAGES_WITHOUT_INTERFACES):
-        _resource(index / "packages" / package, "")
+        _resource(prefix / _INDEX / "rosidl_interfaces" / package, "\n".join(files))
+        _resource(prefix / _INDEX / "packages" / package, "")
     return prefix
 
 

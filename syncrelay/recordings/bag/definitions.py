@@ -57,6 +57,19 @@ def fields_in(store: Typestore) -> FieldsOf:
     return fields
 
 
+def require_same(channel: Channel, store: Typestore, *, of: str) -> None:
+    """Raise BagError where a channel's messages are serialized by another definition than the one in a store."""
+    recorded = typestore(channel.type, channel.definition)
+    if recorded is None or channel.type not in store.fielddefs:
+        raise BagError(f"{channel.topic}: the definition of {channel.type} is not known")
+    if not is_same_wireformat(recorded, store, channel.type, channel.type):
+        hashes = [each.hash_rihs01(channel.type) for each in (recorded, store)]
+        raise BagError(
+            f"{channel.topic} is recorded with another definition of {channel.type} than {of} has here:"
+            f" {hashes[0]}, here {hashes[1]}"
+        )
+
+
 def begins_with_header(channel: Channel) -> bool | None:
     """Tell whether payloads begin with a std_msgs/Header; None if the type is unknown."""
     fields = _store_of(channel.type, channel.definition).fielddefs.get(channel.type)

@@ -1,14 +1,18 @@
 """Writes the sets of a replay as a recording of what the relay would have published."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from syncrelay.cdr import patch_stamp
+from syncrelay.cdr_assembly import UnfitError
 from syncrelay.config.names_in_graph import MANIFEST_TYPE, manifest_topic
 from syncrelay.config.profile import Profile, matched
+from syncrelay.config.resolved import BundleConfig
+from syncrelay.dataflow.bundle import Bundle
 from syncrelay.dataflow.manifest import MANIFEST_DEPTH, ManifestWriter, Note, header_stamp
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag.bindings import GroupBinding, Input
+from syncrelay.recordings.bag.bundles import recorded_bundle
 from syncrelay.recordings.bag.definitions import as_ros2, begins_with_header, converter, jazzy_definition
 from syncrelay.recordings.bag.mcap_output import McapOutput, Output
 from syncrelay.recordings.bag.recording import Channel, Encoding
@@ -20,6 +24,21 @@ class Outgoing(NamedTuple):
 
     written: Callable[[bytes, int | None], bytes]
     has_header: bool
+
+
+class _Left(NamedTuple):
+    """A message of a set as it leaves, its stamp then, and when it was received."""
+
+    content: bytes
+    stamp: int
+    received: int
+
+
+class _Bundles(NamedTuple):
+    """What makes the bundles of a group, and their topic in the recording."""
+
+    bundle: Bundle
+    output: Output
 
 
 class _Manifest(NamedTuple):
@@ -41,14 +60,22 @@ class SetWriter:
         self._outputs: dict[str, Output] = {}
         self._payloads: dict[tuple[str, Channel], Outgoing] = {}
         self._manifests: dict[str, _Manifest] = {}
+        self._bundles: dict[str, _Bundles] = {}
         self.messages = 0
         """How many messages were written, without manifests."""
 
     def begin(self, binding: GroupBinding) -> None:
-        """Add the output topics of a group; those without a message are recorded too."""
+        """Add the output topics of a group; those without a message are recorded too.
+
+        Raises BagError where its sets cannot be written as bundles.
+        """
         for each in binding.inputs:
-            if each.channels:
-                self._add(each)
+            for channel in each.channels:
+                self._payloads[each.output, channel] = outgoing(each, channel)
+            if each.channels and binding.group.options.outputs:
+                self._outputs[each.output] = self._output(each)
+        if binding.group.bundle is not None and binding.is_complete:
+            self._bundles[binding.group.name] = self._bundles_of(binding, binding.group.bundle)
         if binding.group.options.manifest:
             self._manifests[binding.group.name] = self._manifest(binding)
 
@@ -57,27 +84,46 @@ class SetWriter:
         if not isinstance(outcome, Match):
             return
         pairs = zip(binding.inputs, outcome.messages, strict=True)
-        stamp = outcome.stamp
-        written = [
-            (None, None, 0) if message is None else self._write(each, message, stamp, now) for each, message in pairs
-        ]
+        left = [None if message is None else self._left(each, message, outcome.stamp) for each, message in pairs]
+        sent = self._publish(binding, outcome, left, now)
         manifest = self._manifests.get(binding.group.name)
         if manifest is not None:
-            left_as, received, sent = zip(*written, strict=True)
+            stamps = [each and each.stamp for each in left]
+            received = [each and each.received for each in left]
             latency = now - max(each for each in received if each is not None)
-            note = Note(manifest.output.count + 1, latency, stamp, outcome.stamps, left_as, received, sent, {})
+            note = Note(manifest.output.count + 1, latency, outcome.stamp, outcome.stamps, stamps, received, sent, {})
             self._recording.write(manifest.output, manifest.writer.write(note), now)
 
-    def _write(self, each: Input, message: Message, stamp: int | None, now: int) -> tuple[int, int, int]:
-        """Write a message; return its stamp as it leaves, when it was received, and its number among its topic's."""
+    def _left(self, each: Input, message: Message, stamp: int | None) -> _Left:
         channel, received, payload = message.payload
-        output, payload_of = self._outputs[each.output], self._payloads[each.output, channel]
+        payload_of = self._payloads[each.output, channel]
         content = payload_of.written(payload, stamp)
+        is_as_matched = not payload_of.has_header or (stamp is None and each.config.is_by_header)
+        return _Left(content, message.stamp if is_as_matched else header_stamp(content), received)
+
+    def _publish(self, binding: GroupBinding, match: Match, left: Sequence[_Left | None], now: int) -> list[int]:
+        """Write the messages of a set; return the number of each among those of its topic, 0 of one that is missing."""
+        outputs = [self._outputs.get(each.output) for each in binding.inputs]
+        bundles = self._bundles.get(binding.group.name)
+        if bundles is not None:
+            contents = [each and each.content for each in left]
+            try:
+                whole = bundles.bundle.content(contents, match.stamps, match.stamp, bundles.output.count + 1)
+            except UnfitError as error:
+                raise BagError(f"{bundles.output.topic}: {error}") from error
+            self._write(bundles.output, whole, now)
+            if not binding.group.options.outputs:
+                return [bundles.output.count if each is not None else 0 for each in left]
+        sent = [0] * len(left)
+        for index, (each, output) in enumerate(zip(left, outputs, strict=True)):
+            if each is not None and output is not None:
+                self._write(output, each.content, now)
+                sent[index] = output.count
+        return sent
+
+    def _write(self, output: Output, content: bytes, now: int) -> None:
         self._recording.write(output, content, now)
         self.messages += 1
-        is_as_matched = not payload_of.has_header or (stamp is None and each.config.is_by_header)
-        leaves_as = message.stamp if is_as_matched else header_stamp(content)
-        return leaves_as, received, output.count
 
     def _manifest(self, binding: GroupBinding) -> "_Manifest":
         node = binding.group.inputs.node
@@ -86,13 +132,21 @@ class SetWriter:
         topic, profile = node.absolute(manifest_topic(binding.group.name)), Profile(depth=MANIFEST_DEPTH)
         return _Manifest(writer, self._recording.add(topic, MANIFEST_TYPE, *jazzy_definition(MANIFEST_TYPE), profile))
 
-    def _add(self, each: Input) -> None:
+    def _output(self, each: Input) -> Output:
         first = each.channels[0]
-        offered = [profile for channel in each.channels for profile in channel.qos]
-        profile = matched(each.config.qos, offered)
-        self._outputs[each.output] = self._recording.add(each.output, first.type, *as_ros2(first), profile)
-        for channel in each.channels:
-            self._payloads[each.output, channel] = outgoing(each, channel)
+        return self._recording.add(each.output, first.type, *as_ros2(first), _profile(each))
+
+    def _bundles_of(self, binding: GroupBinding, config: BundleConfig) -> _Bundles:
+        recorded = recorded_bundle(binding.group, [channel for each in binding.inputs for channel in each.channels])
+        profile = matched(config.qos, [_profile(each) for each in binding.inputs if each.channels])
+        topic = binding.group.inputs.node.absolute(config.topic)
+        output = self._recording.add(topic, config.type, recorded.definition, recorded.type_hash, profile)
+        return _Bundles(recorded.bundle, output)
+
+
+def _profile(each: Input) -> Profile:
+    """Return what an input's messages leave with."""
+    return matched(each.config.qos, [profile for channel in each.channels for profile in channel.qos])
 
 
 def outgoing(each: Input, channel: Channel) -> Outgoing:

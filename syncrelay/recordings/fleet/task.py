@@ -22,7 +22,9 @@ NOTES: Final = "notes"
 
 # Options of groups and inputs that do not change which sets there are. `topics`, `trigger` and `restamp` count as
 # resolved by the file, see _of_sets.
-_NOT_OF_SETS: Final = frozenset({"topics", "trigger", "restamp", "output_prefix", "lazy", "manifest"})
+_NOT_OF_SETS: Final = frozenset(
+    {"topics", "trigger", "restamp", "output_prefix", "lazy", "manifest", "bundle", "outputs"}
+)
 _NOT_OF_INPUTS: Final = frozenset({"output", "qos"})
 
 
@@ -72,6 +74,7 @@ def what_decides_outputs(groups: Iterable[GroupConfig]) -> str:
         [
             _of_sets(group),
             [(group.inputs.node.absolute(each.output), each.qos) for each in group.topics],
+            group.bundle,
             group.options.manifest and group.inputs.node.absolute("~"),
         ]
         for group in groups

@@ -24,7 +24,7 @@ _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
 _RIG = rig(10)
 
 
-def _written(bag: Path, output: Path, **keys) -> list[Frame]:
+def write(bag: Path, output: Path, **keys) -> list[Frame]:
     """What a replay with a group of a camera and a lidar writes, as rosbags reads it."""
     with (
         bound(bag, text=rig_file(**{"manifest": False, **keys})) as (recording, bindings),
@@ -42,15 +42,15 @@ def _read(output: Path) -> list[Frame]:
         return [Frame(each.topic, each.msgtype, time, payload) for each, time, payload in reader.messages()]
 
 
-def _payloads(frames, topic):
+def payloads(frames, topic):
     return [frame.payload for frame in frames if frame.topic == topic]
 
 
 @pytest.mark.parametrize("output", ["out.mcap", "out"])
 def test_payloads_are_written_unchanged_on_the_outputs(output, tmp_path):
-    written = _written(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / output)
+    written = write(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / output)
     for topic in _PAIR:
-        assert _payloads(written, f"/front{topic}") == _payloads(_RIG, topic)[:-1]
+        assert payloads(written, f"/front{topic}") == payloads(_RIG, topic)[:-1]
     # A set leaves with the message that shows that no closer one can come.
     assert {frame.time for frame in written} <= {frame.time for frame in _RIG}
 
@@ -58,7 +58,7 @@ def test_payloads_are_written_unchanged_on_the_outputs(output, tmp_path):
 @pytest.mark.parametrize("output", ["out.mcap", "out"])
 def test_types_and_qos_are_recorded(output, tmp_path):
     bag = write_folder(tmp_path / "rig", _RIG, qos=[BEST_EFFORT])
-    _written(bag, tmp_path / output)
+    write(bag, tmp_path / output)
     with Reader(tmp_path / output) as reader:
         assert reader.message_count == 18
         for connection in reader.connections:
@@ -70,7 +70,7 @@ def test_types_and_qos_are_recorded(output, tmp_path):
 
 
 def test_a_folder_has_the_metadata_of_rosbag2(tmp_path):
-    written = _written(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out")
+    written = write(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out")
     with Reader(tmp_path / "out") as reader:
         assert (reader.start_time, reader.end_time) == (written[0].time, written[-1].time + 1)
         assert {each.topic: each.msgcount for each in reader.connections} == {"/front/camera": 9, "/front/lidar": 9}
@@ -79,8 +79,8 @@ def test_a_folder_has_the_metadata_of_rosbag2(tmp_path):
 
 @pytest.mark.parametrize("restamp", ["none", "earliest"])
 def test_messages_of_a_ros1_bag_are_written_as_ros2_has_them(restamp, tmp_path):
-    from_ros1 = _written(write_ros1(tmp_path / "rig.bag", _RIG), tmp_path / "one", restamp=restamp)
-    from_ros2 = _written(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "two", restamp=restamp)
+    from_ros1 = write(write_ros1(tmp_path / "rig.bag", _RIG), tmp_path / "one", restamp=restamp)
+    from_ros2 = write(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "two", restamp=restamp)
     assert from_ros1 == from_ros2
     with Reader(tmp_path / "one") as reader:
         assert {each.msgdef.data for each in reader.connections} == {STORE.generate_msgdef(VECTOR, ros_version=2)[0]}
@@ -88,13 +88,13 @@ def test_messages_of_a_ros1_bag_are_written_as_ros2_has_them(restamp, tmp_path):
 
 
 def test_outputs_without_a_set_are_there_too(tmp_path):
-    assert _written(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out", slop="1ms") == []
+    assert write(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out", slop="1ms") == []
     with Reader(tmp_path / "out") as reader:
         assert {each.topic for each in reader.connections} == {"/front/camera", "/front/lidar"}
 
 
 def test_a_manifest_is_written_behind_the_messages_of_its_set(tmp_path):
-    written = _written(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out", manifest=True, restamp="earliest")
+    written = write(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out", manifest=True, restamp="earliest")
     sets = [written[at : at + 3] for at in range(0, len(written), 3)]
     assert len(sets) == 9
     for number, (camera, lidar, manifest) in enumerate(sets, 1):
@@ -117,11 +117,11 @@ def test_a_manifest_is_written_behind_the_messages_of_its_set(tmp_path):
 def test_a_manifest_tells_the_stamps_that_messages_leave_with_whatever_they_are_matched_by(key, tmp_path):
     topics = [{"topic": topic, "type": VECTOR, **key} for topic in _PAIR]
     bag = write_mcap(tmp_path / "rig.mcap", _RIG)
-    written = _written(bag, tmp_path / "out", manifest=True, topics=topics, slop="50s")
-    told = [read(payload) for payload in _payloads(written, "/syncrelay/front/sets")]
+    written = write(bag, tmp_path / "out", manifest=True, topics=topics, slop="50s")
+    told = [read(payload) for payload in payloads(written, "/syncrelay/front/sets")]
     assert len(told) > 1
     for index, topic in enumerate(_PAIR):
-        left = [stamp_of(payload) for payload in _payloads(written, f"/front{topic}")]
+        left = [stamp_of(payload) for payload in payloads(written, f"/front{topic}")]
         assert [each.inputs[index].stamp for each in told] == left
         assert left != [each.inputs[index].original_stamp for each in told]
 
@@ -129,9 +129,9 @@ def test_a_manifest_tells_the_stamps_that_messages_leave_with_whatever_they_are_
 def test_nothing_is_overwritten(tmp_path):
     bag = write_mcap(tmp_path / "rig.mcap", _RIG)
     with pytest.raises(OutputError, match=r"rig\.mcap: already exists and is not overwritten"):
-        _written(bag, bag)
+        write(bag, bag)
     with pytest.raises(OutputError, match=r"cannot be written: .*none is not a folder"):
-        _written(bag, tmp_path / "none" / "out.mcap")
+        write(bag, tmp_path / "none" / "out.mcap")
 
 
 def test_profiles_are_read_from_every_version_of_the_metadata():
