@@ -1,4 +1,4 @@
-"""configs/prometheus/alerts.yaml: promtool takes the rules, and each of them fires for what it names and for nothing else."""
+"""configs/prometheus/alerts.yaml: promtool takes the rules, and each fires for what it names and for nothing else."""
 
 import shutil
 import subprocess
