@@ -36,6 +36,8 @@ class Command(NamedTuple):
     usage: str
     does: str
     needs: tuple[Need, ...] = ()
+    works_on: str = ""
+    """What it is for, under which it stands in the first help; empty for those that only the whole help names."""
 
     @property
     def name(self) -> str:
@@ -48,6 +50,9 @@ class Command(NamedTuple):
         return parser
 
 
+_FILE: Final = "a file"
+_BAGS: Final = "recordings"
+_ROBOT: Final = "a robot"
 _RECORDINGS: Final = Need("recordings")
 _TO_DRAW: Final = Need("top", "to draw on a terminal, where it prints text otherwise", lambda _: False)
 _TABLE: Final = Need("datasets", "for `--into`", lambda arguments: arguments.into is not None)
@@ -56,12 +61,21 @@ _RAY: Final = Need("fleet", "for `--engine ray`", lambda given: given.engine == 
 COMMANDS: Final[Mapping[str, Command]] = {
     each.name: each
     for each in (
-        Command("validate FILE...", "check files; show every error at its line"),
-        Command("diff OLD NEW", "say what a reload to another file would do"),
-        Command("graph FILE...", "draw the groups of files as Mermaid or text"),
-        Command("init --from-bag BAG", "propose a file for a recording, or for a live graph", (_RECORDINGS,)),
-        Command("analyze BAG...", "measure recordings, and suggest values that fit", (_RECORDINGS, _TABLE, _RAY)),
-        Command("replay BAG...", "run a file's groups on a recording, without ROS", (_RECORDINGS, _RAY)),
+        Command("validate FILE...", "check files; show every error at its line", works_on=_FILE),
+        Command("diff OLD NEW", "say what a reload to another file would do", works_on=_FILE),
+        Command("graph FILE...", "draw the groups of files as Mermaid or text", works_on=_FILE),
+        Command(
+            "init --from-bag BAG", "propose a file for a recording, or for a live graph", (_RECORDINGS,), works_on=_BAGS
+        ),
+        Command(
+            "analyze BAG...",
+            "measure recordings, and suggest values that fit",
+            (_RECORDINGS, _TABLE, _RAY),
+            works_on=_BAGS,
+        ),
+        Command(
+            "replay BAG...", "run a file's groups on a recording, without ROS", (_RECORDINGS, _RAY), works_on=_BAGS
+        ),
         Command(
             "export BAG...",
             "write the matched sets of recordings as datasets",
@@ -70,22 +84,26 @@ COMMANDS: Final[Mapping[str, Command]] = {
                 Need("datasets", "for `--format parquet` and `lerobot`", lambda given: given.format != "mcap"),
                 _RAY,
             ),
+            works_on=_BAGS,
         ),
-        Command("test FILE...", "run the tests of a configuration, without ROS", (_RECORDINGS,)),
+        Command("test FILE...", "run the tests of a configuration, without ROS", (_RECORDINGS,), works_on=_FILE),
         Command(
             "demo",
             "try it on simulated sensors; needs no robot",
             (Need("recordings", "for `--record`", lambda arguments: arguments.record is not None), _TO_DRAW),
         ),
-        Command("doctor", "find out why messages may not arrive"),
-        Command("observe", "try a file beside a running robot; publishes nothing", (_RECORDINGS, _TO_DRAW)),
+        Command("doctor", "find out why messages may not arrive", works_on=_ROBOT),
+        Command(
+            "observe", "try a file beside a running robot; publishes nothing", (_RECORDINGS, _TO_DRAW), works_on=_ROBOT
+        ),
         Command(
             "top",
             "watch a running relay, here or on another machine",
             (Need("top", "unless `--once` is given", lambda arguments: not arguments.once),),
+            works_on=_ROBOT,
         ),
-        Command("tap [GROUP]", "print each set and drop of a running relay"),
-        Command("reload", "make a running relay read its file again"),
+        Command("tap [GROUP]", "print each set and drop of a running relay", works_on=_ROBOT),
+        Command("reload", "make a running relay read its file again", works_on=_ROBOT),
         Command("healthcheck", "check that the relay is receiving"),
         Command(
             "schema",
@@ -97,9 +115,17 @@ COMMANDS: Final[Mapping[str, Command]] = {
 }
 
 
-def commands_help() -> str:
-    """Return a line for each command."""
-    return "\n".join(f"  {each.usage:<21}{each.does}" for each in COMMANDS.values())
+def commands_help(*, are_all: bool) -> str:
+    """Return a line for each command, under what it is for; of the others only if they are `all`."""
+    by_use: dict[str, list[str]] = {use: [] for use in (_FILE, _BAGS, _ROBOT, "")}
+    for each in COMMANDS.values():
+        by_use[each.works_on].append(f"  {each.usage:<21}{each.does}")
+    others = by_use.pop("")
+    parts = [f"for {use}:\n{chr(10).join(lines)}" for use, lines in by_use.items()]
+    last = (
+        "\n".join(["others:", *others]) if are_all else "new here: syncrelay demo; all commands: syncrelay --help --all"
+    )
+    return "\n".join([*parts, last])
 
 
 def require_extras(command: Command, arguments: Namespace) -> None:

@@ -24,11 +24,15 @@ def dispatch(words: Sequence[str], *, stop: StopRequest) -> int:
 
         return complete()
     try:
+        if words[:1] == ["help"]:
+            words = ["--help", *words[1:]]
+        if "--all" in words and words[0] in ("-h", "--help", "--all") and {"-h", "--help"} & {*words}:
+            from syncrelay.cli.run import parser
+
+            return _run("run", ["--help"], stop, parser(with_all_commands=True))
         if not words or words[0].startswith("-"):
             return _run("run", words or ["--help"], stop)
         first, *rest = words
-        if first == "help":
-            return _run("run", ["--help"], stop)
         if first not in COMMANDS:
             raise UsageError(_unknown_command(first))
         return _run(first, rest, stop)
@@ -38,10 +42,10 @@ def dispatch(words: Sequence[str], *, stop: StopRequest) -> int:
         return code
 
 
-def _run(name: str, words: Sequence[str], stop: StopRequest) -> int:
+def _run(name: str, words: Sequence[str], stop: StopRequest, parser: "Parser | None" = None) -> int:
     """Read the words, check that what they need is installed, and run the module of this name."""
     module = import_module(f"syncrelay.cli.{name}")
-    parser: Parser = module.parser()
+    parser = parser or module.parser()
     arguments = parser.read(words)
     if name in COMMANDS:
         require_extras(COMMANDS[name], arguments)

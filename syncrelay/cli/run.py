@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from syncrelay.status.server import Server
 
 
-def parser() -> Parser:
+def parser(*, with_all_commands: bool = False) -> Parser:
     from syncrelay.cli.commands import commands_help
 
     exit_codes = f"exit codes: {', '.join(f'{code} {means}' for code, means in EXIT_CODES.items())}"
@@ -31,7 +31,7 @@ def parser() -> Parser:
         example="syncrelay --config fusion.yaml",
         description="Matches ROS 2 messages by time, as a YAML file says, and republishes the sets.",
         usage="syncrelay --config FILE [option ...] | syncrelay COMMAND ...",
-        epilog=f"commands:\n{commands_help()}\n\n{folded(exit_codes)}",
+        epilog=f"{commands_help(are_all=with_all_commands)}\n\n{folded(exit_codes)}",
     )
     parser.add_repeatable("--config", metavar="FILE", help="run groups of FILE, or a directory")
     parser.add_repeatable("--group", metavar="NAME", help="run this group only")
@@ -47,6 +47,7 @@ def parser() -> Parser:
     add("--log-format", choices=("text", "json"), default="text", metavar="FORMAT", help="text (default) or json")
     add("--ros-args", action="store_true", help="pass what follows to ROS, such as -r __ns:=/robot1")
     add("--version", action="store_true", help="print the version")
+    add("--all", action="store_true", help="with --help: name all commands")
     return parser
 
 
@@ -59,6 +60,8 @@ def command(parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
     if arguments.version:
         put(f"syncrelay {own_version()}")
         return DONE
+    if arguments.all:
+        parser.error("--all goes with --help")
     if not arguments.config:
         parser.error("--config FILE is missing")
     parser.refuse_repeated(arguments.config)

@@ -19,6 +19,23 @@ def test_help_is_the_same_however_it_is_asked_for_and_goes_to_stdout(tmp_path):
     assert run("help", folder=tmp_path).stdout == run("-h", folder=tmp_path).stdout == done.stdout
 
 
+def test_the_first_help_names_what_most_need_by_what_it_is_for_and_the_whole_one_all(tmp_path):
+    first, whole = run("--help", folder=tmp_path).stdout, run("--help", "--all", folder=tmp_path).stdout
+    assert whole == run("help", "--all", folder=tmp_path).stdout == run("--all", "-h", folder=tmp_path).stdout
+    named = {command: f"\n  {command} " in first for command in COMMANDS}
+    assert [command for command, is_first in named.items() if not is_first and f"\n  {command} " not in whole] == []
+    for use, commands in {
+        "a file": ("validate", "diff", "graph", "test"),
+        "recordings": ("init", "analyze", "replay", "export"),
+        "a robot": ("doctor", "observe", "top", "tap", "reload"),
+    }.items():
+        below = first.split(f"\nfor {use}:\n")[1].split("\n")
+        assert [line.split()[0] for line in below[: len(commands)]] == [*commands]
+    assert not any(named[command] for command in ("demo", "schema", "completion", "healthcheck"))
+    alone = run("--all", folder=tmp_path)
+    assert (alone.returncode, alone.stderr.split("\n")[0]) == (2, "syncrelay: --all goes with --help")
+
+
 @pytest.mark.parametrize("command", ["", *COMMANDS])
 def test_the_help_of_a_command_fits_a_screen(command, tmp_path):
     done = run_here(*filter(None, [command]), "--help", folder=tmp_path)
