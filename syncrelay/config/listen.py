@@ -23,13 +23,15 @@ class Listen:
     """A host and a range of ports, of which the first free one is taken; port 0 means any free port.
 
     `is_asked_for` is False for the default, which a relay can do without. `hosts` are further names and addresses that
-    requests may use, as parse_host returns them.
+    requests may use, as parse_host returns them. `ready_share` is the share of its sets that a ready relay gives, if
+    that matters.
     """
 
     host: str
     ports: range
     is_asked_for: bool = True
     hosts: tuple[str, ...] = ()
+    ready_share: float | None = None
 
     def __str__(self) -> str:
         first, last = self.ports[0], self.ports[-1]

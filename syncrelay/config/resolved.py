@@ -159,9 +159,10 @@ def resolve_listen(metrics: MetricsConfig | None) -> Listen | None:
     """Return where to listen for HTTP; None for nowhere."""
     if metrics is None:
         return None
-    if metrics.listen is None:
-        return Listen(DEFAULT_HOST, DEFAULT_PORTS, is_asked_for=False, hosts=metrics.hosts)
-    return replace(parse_listen(metrics.listen), hosts=metrics.hosts)
+    is_asked_for = metrics.listen is not None
+    listen = Listen(DEFAULT_HOST, DEFAULT_PORTS) if metrics.listen is None else parse_listen(metrics.listen)
+    share = None if metrics.ready is None else metrics.ready.share
+    return replace(listen, is_asked_for=is_asked_for, hosts=metrics.hosts, ready_share=share)
 
 
 def _group(name: str, group: Group, node: NodeConfig) -> GroupConfig:

@@ -64,6 +64,20 @@ class NodeConfig(Keys):
         return expand(name, node=self.name, namespace=self.namespace)
 
 
+class ReadyConfig(Keys):
+    """When the relay is ready, beside what it needs to be at all."""
+
+    share: float = Field(
+        gt=0,
+        le=1,
+        description=(
+            "The share of its possible sets that each group has to give, of the last seconds, above 0 to 1. Before it"
+            " is known the relay is not ready; groups that are lazy and sleep do not count."
+        ),
+        examples=[0.8],
+    )
+
+
 class MetricsConfig(Keys):
     """HTTP for programs and people: /status, which `syncrelay top` shows, /metrics, /livez and /readyz."""
 
@@ -83,6 +97,14 @@ class MetricsConfig(Keys):
             " `listen` is open to other machines. Default: none."
         ),
         examples=[["robot.lab.example"]],
+    )
+    ready: Annotated[ReadyConfig | None, NOT_NULL] = Field(
+        default=None,
+        description=(
+            "What /readyz waits for beside publishers that fit: sets. Default: sets may still be missing when it says"
+            " that the relay is ready."
+        ),
+        examples=[{"share": 0.8}],
     )
 
 

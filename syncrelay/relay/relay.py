@@ -358,6 +358,7 @@ class Relay:
     def state(self) -> RelayState:
         """The state of the relay, as last evaluated. Any thread."""
         self._asked = now = self._runtime.monotonic()
+        listen = self._groups.config.listen
         return RelayState(
             node=self.node.name,
             config=", ".join(self._config_paths),
@@ -370,6 +371,7 @@ class Relay:
             refused_reloads=self._groups.refused_reloads,
             reload_error=self._groups.reload_error,
             unjudged=self.monitor.unjudged,
+            ready_share=None if listen is None else listen.ready_share,
             published_by=self.monitor.published_by,
         )
 

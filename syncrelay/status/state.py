@@ -46,6 +46,8 @@ class RelayState:
     reload_error: str | None = None
     unjudged: tuple[str, ...] = ()
     """Groups without a report, as all are before the first one."""
+    ready_share: float | None = None
+    """The share of its possible sets that each group gives where the relay is ready; None if that does not matter."""
     published_by: Mapping[str, str] = field(default_factory=dict)
     """Which node publishes a topic, or did when it was last seen."""
 
@@ -72,7 +74,10 @@ def advice(phase: Phase, node: str) -> str | None:
 
 
 def is_ready(state: RelayState) -> bool:
-    """Whether the relay runs or observes, is not paused, and every required input is served and let through."""
+    """Whether the relay runs or observes, is not paused, and every required input is served and let through.
+
+    Where the file asks for it, also whether every group that is awake gives its share of the possible sets.
+    """
     inputs = [each for report in state.groups for each in report.facts.inputs if each.required]
     return (
         state.phase in (Phase.RUNNING, Phase.OBSERVING)
@@ -80,7 +85,13 @@ def is_ready(state: RelayState) -> bool:
         and not state.unjudged
         and all(report.facts.failure is None for report in state.groups)
         and all(_is_served(each) for each in inputs)
+        and (state.ready_share is None or all(_gives(report, state.ready_share) for report in state.groups))
     )
+
+
+def _gives(report: GroupReport, least: float) -> bool:
+    share = report.facts.figures.share.value
+    return report.facts.asleep or (share is not None and share >= least)
 
 
 def _is_served(an_input: InputFacts) -> bool:

@@ -214,6 +214,8 @@ OPTIONS: dict[str, Row] = {
     "hosts: beside listen": of_section(
         lambda config: config.listen and config.listen.hosts, metrics={"listen": "0.0.0.0:80", "hosts": ["robot"]}
     ),
+    "ready": of_section(lambda config: config.listen and config.listen.ready_share, metrics={"ready": {"share": 0.8}}),
+    "share": of_section(lambda config: config.listen and config.listen.ready_share, metrics={"ready": {"share": 0.5}}),
     "diagnostics": of_section(lambda config: config.diagnostics, diagnostics=None),
     "scalars": of_section(lambda config: config.diagnostics, diagnostics={"scalars": True}),
     "defaults": of_section(outputs, defaults={"output_prefix": "/z"}),

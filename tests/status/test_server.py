@@ -11,7 +11,7 @@ from waitress.trigger import trigger
 
 from syncrelay.config.listen import Listen
 from syncrelay.errors import ListenError
-from syncrelay.explain import Endpoint, Mismatch, Refusal, Tape
+from syncrelay.explain import Endpoint, GroupReport, Mismatch, Refusal, Share, Tape
 from syncrelay.status import Phase, Taps, server
 from syncrelay.status.announcement import announced
 from syncrelay.status.server import PATHS_TOLD, Server
@@ -105,6 +105,31 @@ def test_a_relay_lives_while_its_receive_loop_turns(state, answer):
 def test_a_relay_is_ready_while_every_required_input_is_served(state, answer):
     with serving(state) as address:
         assert asked(address, "/readyz") == answer
+
+
+def _giving(left: int, *, possible: int = 100, asleep: bool = False) -> GroupReport:
+    report = working()
+    figures = replace(report.facts.figures, share=Share(left, possible, 10**10))
+    return replace(report, facts=replace(report.facts, figures=figures, asleep=asleep))
+
+
+@pytest.mark.parametrize(
+    ("groups", "is_ready"),
+    [
+        ([_giving(80)], True),
+        ([_giving(79)], False),
+        ([_giving(100), _giving(10)], False),
+        ([_giving(0, possible=0)], False),
+        ([_giving(100), _giving(0, asleep=True)], True),
+    ],
+    ids=["enough", "too few", "one of two", "not known yet", "one sleeps"],
+)
+def test_where_the_file_asks_for_it_a_relay_is_ready_once_enough_sets_leave(groups, is_ready):
+    state = relay(*groups)
+    with serving(replace(state, ready_share=0.8)) as address:
+        assert asked(address, "/readyz")[0] == (200 if is_ready else 503)
+    with serving(state) as address:
+        assert asked(address, "/readyz")[0] == 200
 
 
 @pytest.mark.parametrize(("host", "is_reached"), [("127.0.0.1", False), ("0.0.0.0", True)])  # noqa: S104
