@@ -144,6 +144,13 @@ def test_a_group_whose_messages_have_just_begun_is_not_said_to_be_unexplained():
     assert codes(judge(began(6 * S))) == [Code.UNEXPLAINED]
 
 
+def test_who_is_still_missing_when_others_come_is_told_at_once():
+    missing = [an_input(name, publishers=(), figures={"last_received": None}) for name in ("/camera", "/lidar")]
+    a_judge = Judge()
+    assert codes(a_judge.judge(a_group(*missing, empty_graph=GraphSnapshot(0, "SUBNET")))) == [Code.ALONE]
+    assert codes(a_judge.judge(a_group(*missing, figures={"now": NOW + S}))) == [Code.NO_PUBLISHER]
+
+
 def test_a_cause_that_is_over_does_not_explain_a_silence_for_long():
     a_judge = Judge()
     a_judge.judge(a_group(waited=3 * S))
