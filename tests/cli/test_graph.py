@@ -28,6 +28,10 @@ groups:
     topics:
       - {topic: /lidar, type: sensor_msgs/msg/PointCloud2, output: /cloud}
       - {topic: /odom, stamp: receive}
+  fixed:
+    policy: latest_time
+    trigger: 29.97 Hz
+    topics: [{topic: /lidar}, {topic: /odom}]
 """
 _TEXT = """\
 fusion.yaml
@@ -39,6 +43,10 @@ front: approximate_time, queue_size 20, max_wait 100ms, slop 20ms
 state: latest_time, queue_size 20
   /lidar (sensor_msgs/msg/PointCloud2, trigger) -> /cloud
   /odom (type from the graph, stamp receive)    -> /state/odom
+
+fixed: latest_time, trigger 29.97 Hz, queue_size 20
+  /lidar (sensor_msgs/msg/PointCloud2) -> /fixed/lidar
+  /odom (type from the graph)          -> /fixed/odom
 """
 _BOX = Box(_HOSTILE, (_HOSTILE, "slop 20ms"))
 _ANYTHING = Drawing(_HOSTILE, (_BOX,), ((_BOX, (Path(0, _HOSTILE, is_optional=True, output=_HOSTILE),)),))

@@ -48,9 +48,10 @@ def rig(count: int = 40) -> list[Frame]:
 
 
 def rig_file(name: str = "front", **keys: Any) -> str:
-    """A file that matches the rig's camera and lidar."""
+    """A file that matches the rig's camera and lidar; keys that are None are left out."""
     topics = inputs({"/camera": VECTOR, "/lidar": VECTOR})
-    return config({name: {"policy": "approximate_time", "slop": "5ms", "topics": topics, **keys}})
+    group = {"policy": "approximate_time", "slop": "5ms", "topics": topics, **keys}
+    return config({name: {key: value for key, value in group.items() if value is not None}})
 
 
 def write_mcap(

@@ -25,6 +25,11 @@ def test_a_set_is_told_with_the_stamp_that_it_is_given(tmp_path):
     assert left(tmp_path, PAIR, restamp="latest") == ("A: aA stamped A",)
 
 
+def test_a_set_of_a_tick_is_told_with_the_stamp_of_the_tick(tmp_path):
+    by_clock = {"policy": "latest_time", "slop": None, "trigger": "20 Hz", "restamp": "trigger"}
+    assert left(tmp_path, "camera |.a.......\nlidar  |..A......\n", **by_clock) == ("@5: aA stamped tick",)
+
+
 def test_letters_of_one_key_belong_together(tmp_path):
     drawing = "camera |ab..\nlidar  |..BA\nkeys: aA bB\n"
     group = {"policy": "equal_key", "slop": None, "key": "header.frame_id"}
