@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import pytest
 
-from syncrelay.dataflow.calls import Calls
 from syncrelay.runtime import Runtime
 from tests.simulated.scheduler import MS, SECOND, Process, Scheduler, SimulatedRuntime, StuckError
 
@@ -31,16 +30,6 @@ def test_time_passes_only_while_all_wait(scheduler, runtime):
     runtime.sleep(3600)
     assert (seen, runtime.monotonic_ns() - at) == ([1500 * MS], 3600 * SECOND)
     assert time.monotonic() - began < 30
-
-
-def test_a_rest_ends_by_set_or_by_its_time(scheduler, runtime):
-    rest, begun = runtime.rest(), runtime.monotonic_ns()
-    scheduler.after(MS, rest.set)
-    assert rest.wait(1)
-    assert not rest.wait(1)
-    rest.set()
-    assert rest.wait(None)
-    assert runtime.monotonic_ns() - begun == SECOND + MS
 
 
 def test_futures_give_results_errors_and_timeouts(scheduler, runtime):
@@ -177,18 +166,3 @@ def test_the_end_runs_what_tasks_leave_behind():
         runtime.start("work", work)
         scheduler.sleep(1)
     assert left == ["left"]
-
-
-def test_calls_are_carried_out_by_another_thread(runtime):
-    rest = runtime.rest()
-    calls, ended = Calls(rest.set), False
-
-    def serve():
-        while not ended:
-            rest.wait(None)
-            calls.carry_out()
-
-    runtime.start("serve", serve)
-    future = calls.add(lambda: 5)
-    runtime.sleep(0.01)
-    assert future.result(0) == 5
