@@ -63,6 +63,9 @@ def _told(missing: Missing, an_input: InputFacts, needed: Sequence[int], facts: 
         case Lack.LOOP:
             text = f"the tree of transforms has a loop at {missing.child}"
             cure = "check which nodes publish a transform of it with another parent"
+        case Lack.NO_FRAME if missing.child:
+            text = f"messages of {name} have the frame_id {missing.child}, and tf2 looks up none that begins with `/`"
+            cure = f"have {nodes(an_input)} leave out the `/`"
         case Lack.NO_FRAME:
             text, cure = f"messages of {name} have an empty frame_id", f"have {nodes(an_input)} fill it in"
     return text, cure

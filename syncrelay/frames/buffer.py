@@ -155,7 +155,7 @@ class Frames:
         """
         if source == target:
             return None
-        if not source:
+        if not source or source.startswith("/"):
             return Missing(Lack.NO_FRAME, target, source)
         for frame in (source, target):
             if frame not in self._known:

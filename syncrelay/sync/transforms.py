@@ -28,7 +28,7 @@ class Lack(Enum):
     PAST = "past"
     """An edge has only transforms that are newer than the message."""
     NO_FRAME = "no_frame"
-    """Its frame_id is empty."""
+    """Its frame_id is empty, or begins with `/`, and tf2 looks up none such."""
 
 
 _SEVERITY: Final = {lack: severity for severity, lack in enumerate(Lack)}
@@ -97,9 +97,10 @@ class _Needs:
 class TransformStage:
     """Holds sets until all of their messages can be transformed.
 
-    A set that cannot leave `wait_ns` after it was matched is given up, as `no_transform`; one whose message has an
-    empty frame at once. A set that is ready waits for those before it, but not for those that lie before all that an
-    edge has: only transforms out of order could help these. At most `most` sets wait; the oldest is given up for more.
+    A set that cannot leave `wait_ns` after it was matched is given up, as `no_transform`; one of which a message has no
+    frame that tf2 looks up, at once. A set that is ready waits for those before it, but not for those that lie before
+    all that an edge has: only transforms out of order could help these. At most `most` sets wait; the oldest is given
+    up for more.
     """
 
     __slots__ = ("_followed", "_most", "_passed", "_transforms", "_waiting", "_withheld", "lapses")

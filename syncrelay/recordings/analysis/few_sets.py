@@ -77,6 +77,8 @@ def _without_a_key(group: GroupConfig) -> Iterator[tuple[str, GroupConfig]]:
         wide = (Change("policy", tolerance.wider_policy), Change(tolerance.key, words.exactly(_NO_LIMIT_NS)))
         yield f"policy {options.policy}", changed(group, wide)
     yield f"queue_size {options.queue_size}", _with(group, queue_size=max(options.queue_size, LONGEST_QUEUE))
+    if options.transforms is not None:
+        yield f"the wait for transforms to {options.transforms.target}", _with(group, transforms=None)
     if options.max_wait is not None and group.ticks is None:
         yield _said("max_wait", options.max_wait), _with(group, max_wait=_NO_LIMIT_NS)
 

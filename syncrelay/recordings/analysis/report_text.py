@@ -128,7 +128,10 @@ def _sets(each: GroupAnalysis) -> str:
     if not suggestion.possible:
         return counted(sets, "set")
     together = f"{suggestion.now} of {counted(suggestion.possible, 'possible set')}"
-    return together if sets == suggestion.now else f"{counted(sets, 'set')} after thinning, {together}"
+    if sets == suggestion.now:
+        return together
+    after = "thinning" if each.group.options.transforms is None else "waiting for transforms"
+    return f"{counted(sets, 'set')} after {after}, {together}"
 
 
 def _fates(row: InputFates) -> Iterator[str]:

@@ -34,6 +34,7 @@ FOUND = {
     "a target that no transform names": given_up(Lack.UNKNOWN_FRAME, parent="base_link", child="base_link"),
     "two trees": given_up(Lack.UNCONNECTED, parent="base_link", child="camera_lens"),
     "a loop of transforms": given_up(Lack.LOOP, parent="base_link", child="odom"),
+    "messages with a frame_id of ROS 1": given_up(Lack.NO_FRAME, parent="base_link", child="/laser"),
     "messages with an empty frame_id": given_up(Lack.NO_FRAME, parent="base_link", child=""),
 }
 QUIETLY = {

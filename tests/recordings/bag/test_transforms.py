@@ -6,6 +6,7 @@ import pytest
 
 from syncrelay.explain import Code, Severity
 from syncrelay.recordings.analysis.evaluation import evaluate
+from syncrelay.recordings.analysis.few_sets import why_few_sets
 from syncrelay.recordings.analysis.streams import read_streams
 from syncrelay.recordings.analysis.watching import watch_group
 from syncrelay.recordings.bag.replay import replay
@@ -123,3 +124,13 @@ def test_what_is_missing_of_the_tree_is_named(keys, told, tmp_path):
     assert found.finding.code is Code.NO_TRANSFORM
     assert found.finding.severity is Severity.ERROR
     assert found.finding.text.startswith(told), found.finding.text
+
+
+def test_of_few_sets_the_wait_for_transforms_is_named_as_the_reason(tmp_path):
+    with bound(write_mcap(tmp_path / "drive.mcap", frames(late=150 * MS)), text=FILE) as (recording, (binding,)):
+        (result,) = replay(recording, [binding])
+        why = why_few_sets(recording, binding, [each.counts for each in result.inputs], result.sets)
+    assert why == (
+        "front: only 0 of 40 possible sets are complete, because of the wait for transforms to odom:"
+        " without it, 40 would be"
+    )
