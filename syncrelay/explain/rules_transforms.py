@@ -22,6 +22,11 @@ def no_transform(facts: GroupFacts) -> Found:
     if not dropped or not facts.lapses or facts.transforms is None:
         return
     lapses = [each for each in facts.lapses if each.needed_ns is None][-dropped:]
+    if not facts.has_stopped:
+        # The first messages may be older than the first transforms: that is over once sets leave.
+        lapses = [each for each in lapses if each.missing.lack is not Lack.PAST]
+    if not lapses:
+        return
     needed = [each.needed_ns for each in facts.lapses if each.needed_ns is not None][-dropped:]
     (most, _), *_ = Counter(
         (each.input, each.missing.lack, each.missing.parent, each.missing.child) for each in lapses

@@ -24,8 +24,8 @@ class Kind:
 
     begin: _Begin
     needs: tuple[str, ...]
-    """`sensor` or `group` where it is about one; `sim`, `real`, `played`, `managed`, `several` where the world must be
-    so; `brief` where it is over at once; `start` where it begins with the world."""
+    """`sensor` or `group` where it is about one; `sim`, `real`, `played`, `managed`, `several`, `transforms` where the
+    world must be so; `brief` where it is over at once; `start` where it begins with the world."""
     names: frozenset[str]
     """The first finding of the groups that it concerns is one of these, if any; `starting` and `healthy` go without."""
     must: bool
@@ -125,6 +125,17 @@ def _change(world: World, group: str) -> None:
 def silent(world: World, target: str, _: float) -> End:
     """The publisher is there, and sends nothing."""
     return _set(world, target, is_silent=True)
+
+
+@_kind("transforms", names="no_transform", must=True)
+def transforms_stop(world: World, _: str, __: float) -> End:
+    """Nobody publishes where the robot is."""
+    world.broadcaster.is_silent = True
+
+    def go_on() -> None:
+        world.broadcaster.is_silent = False
+
+    return go_on
 
 
 @_kind("sensor", names="no_publisher alone", must=True)

@@ -11,6 +11,10 @@ from tests.simulated.scheduler import MS
 SETTLED_S: Final = 25.0
 # What is to be named is named within this.
 NAMED_S: Final = 22.0
+# What changes the clocks of stamps: transforms do not cover these, by right.
+_OTHER_STAMPS: Final = frozenset(
+    {"other_clock", "stamps_early", "second_publisher", "clock_set", "clock_stops", "clock_loops", "loops"}
+)
 # All is well again so long after a fault has ended.
 HEALED_S: Final = 60.0
 
@@ -65,6 +69,7 @@ class Group:
         return {**options, "topics": rows}
 
 
+TRANSFORMS: Final = {"target": "odom", "wait": "1s"}
 TYPE: Final = "geometry_msgs/msg/Vector3Stamped"
 
 
@@ -102,6 +107,8 @@ class Plan:
     """How often a participant that joins is found only by the next announcement."""
     watched: bool = False
     """Whether the relay runs with --watch."""
+    transforms: bool = False
+    """Whether sets wait for transforms, which somebody publishes."""
 
     @property
     def by_sim_time(self) -> bool:
@@ -121,7 +128,7 @@ class Plan:
         sensors = "\n".join(f"  {each}" for each in self.sensors)
         odd = {
             key: getattr(self, key)
-            for key in ("node", "eagerness", "lag_ms", "latency_ms", "discovery_ms", "missed", "watched")
+            for key in ("node", "eagerness", "lag_ms", "latency_ms", "discovery_ms", "missed", "watched", "transforms")
         }
         return f"{self.length:.0f} s at {self.hz:g} Hz, {odd}\n{sensors}\n{groups}\n{steps}"
 
@@ -161,6 +168,11 @@ def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
         _sensor(chance, number, every=every, exact=exact) for number in range(chance.choice([2, 2, 3, 3, 4]))
     )
     groups = tuple(_group(chance, f"g{n}", sensors, exact=exact, hz=hz) for n in range(chance.choice([1, 1, 2, 3])))
+    # By chance of its own: worlds without transforms are those that they were.
+    by_key = any("key" in group.options for group in groups)
+    transforms = not by_key and Random(f"transforms {seed}").random() < 0.25
+    if transforms:
+        groups = tuple(replace(each, options={**each.options, "transforms": TRANSFORMS}) for each in groups)
     used = {topic for group in groups for topic in group.topics}
     sensors = tuple(each for each in sensors if each.topic in used)
     node: dict[str, Any] = {}
@@ -185,6 +197,7 @@ def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
         discovery_ms=chance.choice([20.0, 100.0, 900.0]),
         missed=chance.choice([0.0, 0.0, 0.3]),
         watched=chance.random() < 0.3,
+        transforms=transforms,
     )
     steps = tuple(sorted(_steps(chance, plan, kinds, chaotic=chaotic)))
     last = max((step.at + step.seconds for step in steps), default=SETTLED_S)
@@ -244,6 +257,7 @@ def _steps(chance: Random, plan: Plan, kinds: Mapping[str, Sequence[str]], *, ch
     """Draw what happens: one fault after the other, each healed before the next; or, in chaos, all at once."""
     at = SETTLED_S + chance.uniform(0, 10)
     fit = [kind for kind, needs in kinds.items() if _fits(plan, needs) and (chaotic or "start" not in needs)]
+    fit = [kind for kind in fit if not plan.transforms or kind not in _OTHER_STAMPS]
     # A few kinds again and again meet in more ways than one of each.
     fit = chance.sample(fit, k=chance.choice([4, 8, len(fit)])) if chaotic else fit
     for _ in range(chance.randint(4, 14) if chaotic else chance.choice([1, 1, 2, 3])):
@@ -271,4 +285,5 @@ def _fits(plan: Plan, needs: Sequence[str]) -> bool:
         and ("managed" not in needs or plan.is_managed)
         and ("played" not in needs or not any(each.by_clock for each in plan.groups))
         and ("several" not in needs or len(plan.groups) > 1)
+        and ("transforms" not in needs or plan.transforms)
     )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from syncrelay.config import Config
 from syncrelay.config.profile import Profile
+from tests.ros.transforms import TF, transforms
 from tests.simulated.bus import Bus, Reader, Weather, Writer
 from tests.simulated.node import CLOCK_TYPE, SimulatedBackend, SimulatedNode
 from tests.simulated.plan import TYPE, Plan, Sensor
@@ -138,7 +139,8 @@ class Driver:
         if self.sensor.wobble:
             stamp += int(self.sensor.wobble * self.random.random())
         stamp = 0 if self.is_zero else max(0, stamp + self.shift)
-        data = content(stamp, f"{number}/{self.sensor.every}", self.index, number)
+        frame = f"s{self.index}" if self.world.plan.transforms else f"{number}/{self.sensor.every}"
+        data = content(stamp, frame, self.index, number)
         if self.is_cut:
             data = data[:6]
         if self.dies_in_write:
@@ -159,6 +161,31 @@ class Driver:
         """Write a message of no moment of the rig."""
         if self.writer is not None and life == self._life:
             self.writer.write(content(stamp + self.period // 2, "between", self.index, -1))
+
+
+class Broadcaster:
+    """Somebody who publishes transforms: where the sensors are on the robot, and at 20 Hz where that is."""
+
+    def __init__(self, world: "World") -> None:
+        self.world = world
+        self.is_silent = False
+
+    def start(self) -> None:
+        process = Process(self.world.scheduler, "broadcaster")
+        process.clock_offset = self.world.clock_offset
+        node = self.world.bus.participant(process).node("broadcaster")
+        static = node.writer("/tf_static", TF, Profile(depth=1, durability="transient_local"))
+        edges = [("base", f"s{index}", 0) for index in range(len(self.world.plan.sensors))]
+        static.write(transforms("/tf_static", *edges).payload)
+        self.writer = node.writer("/tf", TF, Profile(depth=100))
+        self._publish()
+
+    def _publish(self) -> None:
+        scheduler = self.world.scheduler
+        scheduler.after(50 * MS, self._publish)
+        if not self.is_silent:
+            stamp = self.world.stamp_at(scheduler.now - 10 * MS)
+            self.writer.write(transforms("/tf", ("odom", "base", max(1, stamp))).payload)
 
 
 class Witness:
@@ -250,6 +277,7 @@ class World:
         self.is_to_be_active = False
         self.changed: dict[str, int] = {}
         self.drivers = {each.topic: Driver(self, each, index) for index, each in enumerate(plan.sensors)}
+        self.broadcaster = Broadcaster(self)
         self.witness = Witness(self, list(self.outputs))
         self.answers: list[tuple[float, str, Any]] = []
         self.lines: list[Line] = []
@@ -318,6 +346,8 @@ class World:
         for driver in self.drivers.values():
             self.scheduler.after(int(chance.uniform(0, 3) * SECOND), driver.start)
         self.scheduler.after(int(chance.uniform(0, 3) * SECOND), self.witness.start)
+        if self.plan.transforms:
+            self.broadcaster.start()
         if self.plan.by_sim_time:
             self._start_clock()
         self.scheduler.after(int(chance.uniform(0, 3) * SECOND), self._start_relay)
