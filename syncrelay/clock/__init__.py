@@ -2,5 +2,6 @@
 
 from syncrelay.clock.device_clock import DeviceClock, Step
 from syncrelay.clock.envelope import MOST_RATE
+from syncrelay.clock.mapping import UNREADABLE, host_times
 
-__all__ = ["MOST_RATE", "DeviceClock", "Step"]
+__all__ = ["MOST_RATE", "UNREADABLE", "DeviceClock", "Step", "host_times"]

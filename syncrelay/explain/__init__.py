@@ -3,14 +3,14 @@
 Pure: values in, values out. The running relay and the analysis of recordings both ask here.
 """
 
-from syncrelay.clock import Step
+from syncrelay.clock import UNREADABLE, Step
 from syncrelay.config import Tolerance
 from syncrelay.config.profile import Mismatch
 from syncrelay.explain.cause_log import CauseLog
 from syncrelay.explain.causes import Trouble, listed, troubles
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import BOUNDS_NS, Distribution, Histogram
-from syncrelay.explain.dry_run import UNREADABLE, EngineDriver
+from syncrelay.explain.dry_run import EngineDriver
 from syncrelay.explain.facts import (
     ClockState,
     Endpoint,

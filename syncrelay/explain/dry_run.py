@@ -3,15 +3,13 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Final, Protocol, TypeAlias
 
+from syncrelay.clock import UNREADABLE
 from syncrelay.config import GroupConfig
 from syncrelay.frames import Edge, Frames
 from syncrelay.sync import DropReason, Message, Outcome
 
 Take: TypeAlias = Callable[[Sequence[Outcome], int], None]
 """Told of what leaves together, and at what time, in nanoseconds of receipt."""
-
-UNREADABLE: Final = -(2**63)
-"""Stands in place of a stamp that could not be read."""
 
 
 class _Add(Protocol):

@@ -8,8 +8,8 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from syncrelay.clock import UNREADABLE
 from syncrelay.config import Distance, GroupConfig
-from syncrelay.explain.dry_run import UNREADABLE
 from syncrelay.sync import Message
 
 Nanoseconds: TypeAlias = npt.NDArray[np.int64]

@@ -6,10 +6,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from syncrelay.clock import MOST_RATE, DeviceClock, Step
+from syncrelay.clock import MOST_RATE, DeviceClock, Step, host_times
 from syncrelay.explain.changes import Change, Changes, changed
 from syncrelay.explain.codes import Code
-from syncrelay.explain.dry_run import UNREADABLE
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.figures import InputFigures
 from syncrelay.explain.findings import written
@@ -140,11 +139,11 @@ def _mapped_stamps(trials: Trials, index: int) -> Nanoseconds | None:
     """Return an input's stamps as they would be mapped; None of a clock that would be taken as set time and again."""
     steps: list[Step] = []
     clock, messages = DeviceClock(stepped=steps.append), trials.inputs[index]
-    pairs = list(zip(messages.stamps.tolist(), messages.received.tolist(), strict=True))
-    mapped = [stamp if stamp == UNREADABLE else clock.host_time(stamp, received) for stamp, received in pairs]
-    if not pairs or len(steps) > _FEW_STEPS + (pairs[-1][1] - pairs[0][1]) // _SET_EVERY:
+    received = messages.received.tolist()
+    mapped = np.fromiter(host_times(clock, messages.stamps.tolist(), received), dtype=np.int64)
+    if not received or len(steps) > _FEW_STEPS + (received[-1] - received[0]) // _SET_EVERY:
         return None
-    return np.array(mapped, dtype=np.int64)
+    return mapped
 
 
 def _with_stamps(trials: Trials, index: int, stamps: Nanoseconds, changes: Changes) -> Trials:

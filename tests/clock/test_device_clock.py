@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncrelay.clock import DeviceClock, Step
+from syncrelay.clock import UNREADABLE, DeviceClock, Step, host_times
 from tests.clock import peers
 from tests.clock.traces import SECOND, Trace, rig, trace
 from tests.faults.extent import chosen
@@ -139,3 +139,14 @@ def test_whatever_is_stamped_and_received_is_mapped_to_a_time(arrivals, delay, a
         host = clock.host_time(stamp, received)
         assert -(2**63) < host < 2**63
         assert stamp or host == 0
+
+
+def test_many_stamps_are_mapped_as_they_are_one_by_one_and_those_that_are_none_stay():
+    pairs = [(300 * SECOND + n * 100_000_000, NOW + n * 100_000_000 + (n * 7919 % 13) * 1_000_000) for n in range(80)]
+    pairs[20] = 0, pairs[20][1]
+    clock, of_all = DeviceClock(), DeviceClock()
+    one_by_one = [clock.host_time(*each) for each in pairs]
+    pairs.insert(40, (UNREADABLE, pairs[39][1]))
+    one_by_one.insert(40, UNREADABLE)
+    assert [*host_times(of_all, *zip(*pairs, strict=True))] == one_by_one
+    assert one_by_one[20] == 0

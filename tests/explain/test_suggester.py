@@ -8,9 +8,8 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from syncrelay.explain import Code, Finding, FindingLog, Severity
+from syncrelay.explain import UNREADABLE, Code, Finding, FindingLog, Severity
 from syncrelay.explain.changes import Change
-from syncrelay.explain.dry_run import UNREADABLE
 from syncrelay.explain.nearest import as_arrays
 from syncrelay.explain.other_stamps import by_other_stamps
 from syncrelay.explain.suggester import Suggester

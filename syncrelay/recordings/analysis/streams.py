@@ -8,9 +8,8 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from syncrelay.clock import DeviceClock, Step
+from syncrelay.clock import DeviceClock, Step, host_times
 from syncrelay.config import GroupConfig, StampSource
-from syncrelay.explain import UNREADABLE
 from syncrelay.recordings.bag.bindings import GroupBinding
 from syncrelay.recordings.bag.columns import (
     Batch,
@@ -82,13 +81,7 @@ class Stream:
     def _by_device(self, delay_ns: int) -> "Stream":
         steps: list[Step] = []
         clock = DeviceClock(delay_ns=delay_ns, stepped=steps.append)
-        mapped = array(
-            "q",
-            (
-                stamp if stamp == UNREADABLE else clock.host_time(stamp, received)
-                for stamp, received in zip(self.stamps, self.received, strict=True)
-            ),
-        )
+        mapped = array("q", host_times(clock, self.stamps, self.received))
         mapping = Mapping(self.stamps, tuple(steps), clock.rate, delay_ns)
         return replace(self, stamps=mapped, mapping=mapping, mapped={})
 

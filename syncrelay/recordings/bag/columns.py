@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from syncrelay.cdr import LATEST_STAMP, read_stamp
-from syncrelay.clock import DeviceClock
+from syncrelay.clock import UNREADABLE, DeviceClock, host_times
 from syncrelay.config import GroupConfig, StampSource
-from syncrelay.explain import UNREADABLE
 from syncrelay.recordings.bag.definitions import begins_with_header
 from syncrelay.recordings.bag.payloads import ReadMessage, ReadStamp, message_reader, read_ros1_stamp, stamp_reader
 from syncrelay.recordings.bag.recording import Channel, Encoding, RawMessage
@@ -189,9 +188,8 @@ class Columns:
 
 def _mapped(column: Column, batch: Batch, clock: DeviceClock) -> Column:
     """Return messages with stamps of the host's time; of all channels together, in the order of their receipt."""
-    pairs = zip(column.stamps.tolist(), batch.received[column.places].tolist(), strict=True)
-    stamps = [stamp if stamp == UNREADABLE else clock.host_time(stamp, received) for stamp, received in pairs]
-    return column._replace(stamps=np.array(stamps, dtype=np.int64))
+    stamps = host_times(clock, column.stamps.tolist(), batch.received[column.places].tolist())
+    return column._replace(stamps=np.fromiter(stamps, dtype=np.int64))
 
 
 def _combined(columns: Sequence[Column]) -> Column:
