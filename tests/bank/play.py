@@ -301,7 +301,7 @@ def _wrong_with_cure(draw: Drawn, finding: Finding) -> str | None:
 
     What is off by seconds may be of another clock or take that long: it says what to write in either case.
     """
-    offers = [each for each in re.split(r", or |; ", finding.suggestion or "") if _OFFER.search(each)] or [""]
+    offers = [each for each in re.split(r", or,? |; ", finding.suggestion or "") if _OFFER.search(each)] or [""]
     tried = [_wrong_with(draw, each) for each in (offers if finding.code is Code.OTHER_CLOCK else offers[:1])]
     return None if None in tried else tried[-1]
 
