@@ -122,8 +122,8 @@ def _replay(arguments: Namespace, what_if: "tuple[Fault, ...]", seed_of_faults: 
     tell = say if arguments.json or arguments.drops else put
     for result, binding in zip(results, bindings, strict=True):
         group = binding.group
-        required = [topic.required for topic in group.topics]
-        set_pace = may_set_pace(required, trigger=group.trigger, by_clock=group.ticks is not None)
+        needed = group.enough([each.counts.fed for each in result.inputs])
+        set_pace = may_set_pace(needed, trigger=group.trigger, by_clock=group.ticks is not None)
         fates = drop_fates([each.counts.dropped for each in result.inputs], set_pace)
         for line in summarize(result.name, result.sets, [(each.topic, each.counts) for each in result.inputs], fates):
             tell(line)

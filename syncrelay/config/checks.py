@@ -12,7 +12,7 @@ from syncrelay.config.problems import Problem, Severity
 from syncrelay.config.resolved import GroupConfig
 from syncrelay.config.sections import NodeConfig
 from syncrelay.config.units import MAX_NS, NS_PER_UNIT
-from syncrelay.config.wording import all_of, or_nearest, quoted
+from syncrelay.config.wording import all_of, one_of, or_nearest, quoted
 
 # Beside a message per waiting tick: the one held for the previous tick, and the one for the next.
 _HELD_BESIDE = 2
@@ -39,6 +39,7 @@ def check_groups(groups: Sequence[GroupConfig], document: Document) -> Iterator[
         yield from _times_of_arrival(group, document)
         yield from _keys(group, document)
         yield from _optional_inputs(group, document)
+        yield from _quorum(group, document)
         yield from _unit(group, document)
         yield from _unwritten_types(group, document)
 
@@ -219,14 +220,43 @@ def _keys(group: GroupConfig, document: Document) -> Iterator[Problem]:
 
 def _optional_inputs(group: GroupConfig, document: Document) -> Iterator[Problem]:
     optional = [path for path, topic in group.paths() if not topic.required]
-    if optional and len(optional) == len(group.topics):
+    has_quorum = group.options.quorum is not None or (*group.path, "quorum") in document.faulty
+    if optional and len(optional) == len(group.topics) and not has_quorum:
         path = (*group.path, "topics")
-        text = "all inputs of this group are optional, at least one must be required"
+        text = (
+            "all inputs of this group are optional, at least one must be required, or say with `quorum` how many a set"
+            " needs"
+        )
         yield document.problem(path, text, code="conflict", span=document.key_span(path))
     is_endless = group.options.max_wait is None and (*group.path, "max_wait") not in document.faulty
     if optional and group.options.waits_for_optional and is_endless:
-        text = "an optional input needs the group's `max_wait`: how long a set waits for it, for example 100ms"
-        yield document.problem((*optional[0], "required"), text, code="missing")
+        what, whom = ("a quorum", "the others") if has_quorum else ("an optional input", "it")
+        text = f"{what} needs the group's `max_wait`: how long a set waits for {whom}, for example 100ms"
+        path = (*group.path, "quorum") if has_quorum else (*optional[0], "required")
+        yield document.problem(path, text, code="missing")
+
+
+def _quorum(group: GroupConfig, document: Document) -> Iterator[Problem]:
+    quorum, n_inputs, required = group.options.quorum, len(group.topics), len(group.required)
+    if quorum is None:
+        return
+    path = (*group.path, "quorum")
+    if quorum >= n_inputs:
+        text = (
+            f"the group has {n_inputs} inputs, all of which a set needs without `quorum`: write less, or leave it out"
+        )
+        yield document.problem(path, text, code="bad_value")
+    elif required >= quorum:
+        those = "1 input is" if required == 1 else f"{required} inputs are"
+        text = f"{those} required already, so that `quorum: {quorum}` changes nothing: write more, or leave it out"
+        yield document.problem(path, text, code="conflict")
+    elif not required and not group.options.takes_any:
+        able = one_of(sorted(name for name, model in installed_policies().models.items() if model.takes_any))
+        text = (
+            f"{group.options.policy} makes sets round the inputs that are required: write `required: true` at one, or"
+            f" use {able}"
+        )
+        yield document.problem(path, text, code="conflict")
 
 
 def _unit(group: GroupConfig, document: Document) -> Iterator[Problem]:

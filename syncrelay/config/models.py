@@ -86,11 +86,11 @@ class Topic(Keys):
         examples=["auto", "sensor_data", {"reliability": "best_effort", "depth": 5}],
         json_schema_extra={"default": "auto"},
     )
-    required: bool = Field(
-        default=True,
+    required: Annotated[bool | None, NOT_NULL] = Field(
+        default=None,
         description=(
             "Whether every set needs a message of this input. If false, a set leaves without one after the group's"
-            " max_wait, with latest_time at once. Default: true."
+            " max_wait, with latest_time at once. Default: true; false in a group with a `quorum`."
         ),
     )
     offset: SignedDuration = Field(
@@ -248,6 +248,9 @@ class Group(Keys):
     waits_for_optional: ClassVar[bool] = True
     """Whether a set that lacks an optional message waits for it, up to `max_wait`."""
 
+    takes_any: ClassVar[bool] = False
+    """Whether sets can be made where no input is required, of any so many as `quorum` says."""
+
     waits_for_next: ClassVar[bool] = False
     """Whether a set waits for the next messages, which may be nearer; a topic's `min_period` can shorten that."""
 
@@ -268,13 +271,24 @@ class Group(Keys):
         description="Messages kept per input while they wait for a match. Default: 10.",
         examples=[10],
     )
+    quorum: Annotated[int | None, NOT_NULL] = Field(
+        default=None,
+        ge=1,
+        le=MOST,
+        description=(
+            "How many inputs a set needs, whichever they are; inputs with `required: true` are always among them. Once"
+            " so many are there, a set waits for the others up to `max_wait`. Default: those that are required, which"
+            " are all but for `required: false`."
+        ),
+        examples=[2],
+    )
     max_wait: Annotated[Duration | None, NOT_NULL] = Field(
         default=None,
         description=(
-            "How long a set may wait, once its required messages are there, for optional ones or for a closer match;"
-            " then it leaves as it is. Needed if an input is optional, except with latest_time, which never waits for"
-            " one. Where a clock is the trigger: how long after its tick a set leaves, always. A number is seconds, a"
-            " string has a unit (ns, us, ms, s, min). Default: no limit."
+            "How long a set may wait, once its required messages, or its `quorum`, are there, for optional ones or for"
+            " a closer match; then it leaves as it is. Needed if an input is optional, except with latest_time, which"
+            " never waits for one. Where a clock is the trigger: how long after its tick a set leaves, always. A number"
+            " is seconds, a string has a unit (ns, us, ms, s, min). Default: no limit."
         ),
         examples=["100ms"],
     )

@@ -50,6 +50,8 @@ class SlopGroup(Group):
 class ExactTimeGroup(Group):
     """Sets of equal stamps."""
 
+    takes_any = True
+
     policy: Literal["exact_time"] = Field(description="Sets of equal stamps.")
     topics: tuple[Topic, ...] = Topics
 
@@ -66,6 +68,7 @@ class ExactTimeGroup(Group):
 class ApproximateTimeGroup(SlopGroup):
     """Sets of near stamps, each the best that there is."""
 
+    takes_any = True
     waits_for_next = True
 
     policy: Literal["approximate_time"] = Field(
@@ -129,6 +132,7 @@ class LatestTimeGroup(Group):
     repeats = LatestTime.repeats
     distance = Distance.AGE
     waits_for_optional = False
+    takes_any = True
     trigger_key = "trigger"
     matched_by = ("trigger", "max_age")
 

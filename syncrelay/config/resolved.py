@@ -1,6 +1,6 @@
 """Groups with every default filled in; of a file with faults, as far as they could be read."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from syncrelay.clock import DeviceClock, Step
@@ -24,6 +24,7 @@ class TopicConfig:
     or a StampField with the path of the field; `key` the path of the field to match by, None where stamps are matched.
     `tolerance` is how far its stamps may be from those of its set, None where any distance will do. Where
     `is_of_device`, its stamps are of a clock of its own, and its messages arrive no sooner than `delay_ns` after them.
+    One that is `in_quorum` is not required, and counts as one of those of which a set needs so many.
     """
 
     topic: str
@@ -38,6 +39,7 @@ class TopicConfig:
     tolerance: Tolerance | None
     is_of_device: bool = False
     delay_ns: int = 0
+    in_quorum: bool = False
 
     @property
     def is_by_header(self) -> bool:
@@ -98,6 +100,24 @@ class GroupConfig:
         return self.options.ticks
 
     @property
+    def required(self) -> tuple[int, ...]:
+        """The inputs that every set needs."""
+        return tuple(index for index, topic in enumerate(self.topics) if topic.required)
+
+    @property
+    def quorum(self) -> int:
+        """How many inputs a set needs, the required ones among them."""
+        return max(len(self.required), self.options.quorum or 0)
+
+    def enough(self, numbers: Sequence[float]) -> tuple[int, ...]:
+        """Return the required inputs, and with a `quorum` as many of the others: those with the greatest numbers."""
+        required = self.required
+        others = sorted(
+            (index for index in range(len(self.topics)) if index not in required), key=lambda i: -numbers[i]
+        )
+        return tuple(sorted((*required, *others[: self.quorum - len(required)])))
+
+    @property
     def has_deadlines(self) -> bool:
         """Whether sets may leave as time passes; if not, `expire` never returns anything."""
         options = self.options
@@ -124,6 +144,7 @@ class GroupConfig:
         return SyncGroup(
             self.options.build_policy(self.inputs),
             required=tuple(topic.required for topic in self.topics),
+            quorum=self.quorum,
             max_wait_ns=self.options.max_wait,
             offsets_ns=tuple(topic.offset_ns for topic in self.topics),
             restamp=self.restamp,
@@ -167,11 +188,14 @@ def resolve_listen(metrics: MetricsConfig | None) -> Listen | None:
 
 def _group(name: str, group: Group, node: NodeConfig) -> GroupConfig:
     inputs = Inputs.of(group.topics, node)
+    trigger = _index(group.trigger_topic, inputs)
     return GroupConfig(
         name=name,
-        topics=tuple(_topic(topic, group, name=name) for topic in group.topics),
+        topics=tuple(
+            _topic(topic, group, name=name, is_trigger=index == trigger) for index, topic in enumerate(group.topics)
+        ),
         restamp=_restamp(group, inputs),
-        trigger=_index(group.trigger_topic, inputs),
+        trigger=trigger,
         options=group,
         inputs=inputs,
         bundle=_bundle(group.bundle, inputs),
@@ -185,12 +209,13 @@ def _bundle(bundle: BundleKeys | None, inputs: Inputs) -> BundleConfig | None:
     return BundleConfig(bundle.topic, bundle.type, tuple(by_input.get(name) for name in inputs.names), bundle.qos)
 
 
-def _topic(topic: Topic, group: Group, *, name: str) -> TopicConfig:
+def _topic(topic: Topic, group: Group, *, name: str, is_trigger: bool) -> TopicConfig:
     output = default_output(topic.topic, group=name, prefix=group.output_prefix)
     if topic.output is not None:
         output = topic.output
     if group.bundle is not None and not group.outputs:
         output = group.bundle.topic
+    in_quorum = group.quorum is not None and topic.required is None and not is_trigger
     return TopicConfig(
         topic=topic.topic,
         type=topic.type,
@@ -199,7 +224,8 @@ def _topic(topic: Topic, group: Group, *, name: str) -> TopicConfig:
         offset_ns=topic.offset,
         min_period_ns=topic.min_period if isinstance(topic, PacedTopic) else 0,
         stamp=topic.stamp,
-        required=topic.required,
+        required=topic.required is True or (topic.required is None and not in_quorum),
+        in_quorum=in_quorum,
         key=group.key_of(topic),
         tolerance=group.tolerance_of(topic),
         is_of_device=topic.clock == "device",

@@ -158,6 +158,7 @@ class InputFacts:
     `type` is the file's, or else the graph's; None until it is known. `key` is the newest message's. `offset` is added
     to stamps for matching, in nanoseconds. `served_since` is since when without a break the graph has shown a publisher
     whose messages can be received, None while it shows none. `own_tolerance` is what the file gives this input alone.
+    It is `required` if no set leaves without it. Where it is `in_quorum`, that goes by how many others come.
     """
 
     graph: InputGraph
@@ -169,6 +170,7 @@ class InputFacts:
     offset: int = 0
     served_since: int | None = None
     own_tolerance: Tolerance | None = None
+    in_quorum: bool = False
 
     @property
     def name(self) -> str:
@@ -340,7 +342,7 @@ class GroupFacts:
 
     @property
     def _counted(self) -> tuple[int, ...]:
-        required = [each.required for each in self.inputs]
+        required = [index for index, each in enumerate(self.inputs) if each.required]
         return may_set_pace(required, trigger=self.trigger, by_clock=self.ticks_hz is not None)
 
     def lag(self, index: int) -> int | None:

@@ -82,9 +82,12 @@ def blocks(facts: GroupFacts, an_input: InputFacts) -> Severity:
 
 
 def absence(facts: GroupFacts, an_input: InputFacts) -> Severity:
-    """Return how bad it is that an input is away: a minute later, a group without an optional one is as usual."""
+    """Return how bad it is that an input is away: a minute later, a group without an optional one is as usual.
+
+    Not one without an input that counts for its quorum: there is one less to lose.
+    """
     away = facts.figures.now - max(facts.figures.began, an_input.figures.last_received or 0)
-    is_usual = not an_input.required and not facts.is_recorded and away >= _USUAL
+    is_usual = not (an_input.required or an_input.in_quorum or facts.is_recorded) and away >= _USUAL
     return Severity.OK if is_usual else blocks(facts, an_input)
 
 

@@ -265,6 +265,10 @@ class InputObservation:
         if held_up >= LEAST_HELD_NS:
             self._bursts.extend(bursts([*before, *stamped]))
 
+    def is_coming(self, now: int) -> bool:
+        """Whether messages came until recently."""
+        return bool(self._received) and not self._is_silent_at(now)
+
     def _is_silent_at(self, now: int) -> bool:
         """Whether the pause since the last message is a silence, by the rate until then."""
         times = self._received

@@ -26,26 +26,26 @@ _NEAREST_WINDOW: Final = 60 * _SECOND
 _FEWEST_NEAREST: Final = 20
 # An input whose period is below this share of the longest does not set the pace.
 _AS_SLOW: Final = 0.7
+# An input that more sets than these lack is not one of those that make them.
+_MOST: Final = 0.5
 
 
 class Observation:
     """Gathers what came and left of one group; all times are of one clock, that of `began` and of times of receipt."""
 
     def __init__(self, config: GroupConfig, *, began: int) -> None:
-        options, distance = config.options, config.options.distance
+        options = config.options
         self._began = began
         self._offsets = tuple(topic.offset_ns for topic in config.topics)
-        self._required = [index for index, topic in enumerate(config.topics) if topic.required]
-        # How near those with a tolerance of their own are is not measured.
-        self._measured = [index for index in self._required if config.own_tolerances[index] is None]
+        self._config = config
         self._trigger = config.trigger
         self._ticks_hz = None if config.ticks is None else config.ticks.hz
         self.inputs = [InputObservation() for _ in config.topics]
         nothing = tuple(InputCounts(fed=0, matched=0, dropped={}, buffered=0) for _ in config.topics)
         self._polls = deque([_Poll(began, nothing, 0, 0, (0,) * len(nothing))])
         self._share = ShareWindow(
-            self._required,
-            counted=self._required if self._trigger is None else [self._trigger],
+            config.enough,
+            trigger=self._trigger,
             ticks_hz=self._ticks_hz,
             every=options.every,
             least_period=options.max_rate,
@@ -54,12 +54,7 @@ class Observation:
         self._last_set: int | None = None
         self._resumed: int | None = None
         self._spans, self._latencies = no_values(), no_values()
-        self._nearest_spans = NearestSpans(len(self._measured), distance)
-        self._with_optional = {
-            index: NearestSpans(len(self._required) + 1)
-            for index, topic in enumerate(config.topics)
-            if not topic.required and distance is Distance.SPAN
-        }
+        self._need(config.enough([0] * len(config.topics)))
         self._nearest, self._nearest_at, self._nearest_since = no_values(), no_values(), no_values()
         self._measured_at = began
         self._paces: list[float | None] = [None] * len(self.inputs)
@@ -81,11 +76,12 @@ class Observation:
         stamps = list(zip(*(stamps for stamps, _ in sets), strict=True)) or [()] * len(self.inputs)
         missing = tuple([each.count(None) for each in stamps])
         self._polls.append(_Poll(now, tuple(counts), total_sets, len(sets), missing))
-        if len(self._required) < len(self.inputs):
+        if len(self.needed) < len(self.inputs):
             self._sets_since_without = list(map(_since_without, self._sets_since_without, stamps))
         while len(self._polls) > 1 and self._polls[1].at <= now - WINDOW_NS:
             self._polls.popleft()
         fallen = [each.add(new, by_clock=by_clock) for each, new in zip(self.inputs, arrivals, strict=True)]
+        self._follow_needed(now)
         paces = [each.slowed_from_hz for each in self.inputs]
         clock = None if by_clock is None else by_clock(now)
         self._share.add(counts, total_sets, [each.pace for each in self.inputs], now=now, clock=clock)
@@ -101,7 +97,7 @@ class Observation:
     def figures(self, *, now: int) -> tuple[GroupFigures, tuple[InputFigures, ...]]:
         """Give what is known now, of the group and of its inputs in order."""
         inputs = tuple(self._input_figures(index, now) for index in range(len(self.inputs)))
-        counted = self._required if self._trigger is None else [self._trigger]
+        counted = self.needed if self._trigger is None else (self._trigger,)
         group = GroupFigures(
             now=now,
             began=self._began,
@@ -146,6 +142,34 @@ class Observation:
         """Give the last messages of each input that have stamps, to try values on."""
         return [each.recent() for each in self.inputs]
 
+    def _need(self, needed: tuple[int, ...]) -> None:
+        """Have these be the inputs without which no set leaves, and measure how near they and the others come."""
+        distance = self._config.options.distance
+        self.needed = needed
+        # How near those with a tolerance of their own are is not measured.
+        self._measured = [index for index in needed if self._config.own_tolerances[index] is None]
+        self._nearest_spans = NearestSpans(len(self._measured), distance)
+        self._with_optional = {
+            index: NearestSpans(len(needed) + 1)
+            for index in range(len(self.inputs))
+            if index not in needed and distance is Distance.SPAN
+        }
+
+    def _follow_needed(self, now: int) -> None:
+        """With a quorum, inputs that come are needed, those in sets first. If too few come, the others all are."""
+        if self._config.quorum == len(self._config.required):
+            return
+        missing = self._missing(now)
+        coming = [each.is_coming(now) for each in self.inputs]
+        needed = self._config.enough(
+            [2 * comes - (lacks > _MOST) for comes, lacks in zip(coming, missing, strict=True)]
+        )
+        if not all(coming[index] for index in needed):
+            needed = tuple(index for index in range(len(coming)) if index in needed or not coming[index])
+        if needed != self.needed:
+            self._need(needed)
+            self._forget_nearest()
+
     def _begin_anew(self, now: int) -> None:
         """Forget what lies in the future after this machine's clock was set back: it would count forever."""
         self._polls.clear()
@@ -186,7 +210,7 @@ class Observation:
             del self._nearest[:old], self._nearest_at[:old]
             keep_last(self._nearest_since, measured, _LAST_SETS)
         for optional, spans in self._with_optional.items():
-            among = [*self._required, optional]
+            among = [*self.needed, optional]
             pivot = among.index(self._slowest(among))
             self.inputs[optional].add_nearest(spans.add([shifted[index] for index in among], pivot=pivot))
 
@@ -233,7 +257,7 @@ class Observation:
         return (last.sets - first.sets) * _SECOND / max(1, last.at - first.at)
 
     def _missing(self, now: int) -> tuple[float, ...]:
-        if len(self._required) == len(self.inputs):
+        if len(self.needed) == len(self.inputs):
             return (0.0,) * len(self.inputs)
         recent = [poll for poll in self._polls if poll.at > now - WINDOW_NS]
         sent = max(1, sum(poll.sent for poll in recent))

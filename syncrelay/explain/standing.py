@@ -1,7 +1,7 @@
 """A group's standing: the share of its possible sets that left, with hysteresis against chance."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final, NamedTuple
@@ -54,7 +54,7 @@ class Standing(Enum):
 class Share:
     """The sets that left, and those that were possible, in the last `ns` nanoseconds.
 
-    The required input with the fewest messages, received or expected, limits what is `possible`. It is the `pacemaker`;
+    The needed input with the fewest messages, received or expected, limits what is `possible`. It is the `pacemaker`;
     None if a clock makes the sets. `absent` counts its messages that should have come, at its usual pace, and did not.
     `is_pausing` is set while those of any input still do not come.
     """
@@ -107,27 +107,27 @@ class _Poll(NamedTuple):
 class ShareWindow:
     """Measures the share, poll by poll, over the last seconds.
 
-    No set is possible before each of the `required` inputs has come. `counted` are the inputs that can limit the number
-    of sets: all of these, or the trigger alone. `ticks_hz` is the rate of the clock that makes the sets, or None.
-    `every` and `least_period` say how sets are thinned.
+    `enough` returns the inputs that a set needs, those with the greatest numbers where there is a choice. No set is
+    possible before they have come, and they limit the number of sets, or the `trigger` alone. `ticks_hz` is the rate of
+    the clock that makes the sets, or None. `every` and `least_period` say how sets are thinned.
     """
 
     def __init__(
         self,
-        required: Sequence[int],
+        enough: Callable[[Sequence[float]], Sequence[int]],
         *,
-        counted: Sequence[int],
+        trigger: int | None,
         ticks_hz: float | None,
         every: int = 1,
         least_period: int | None = None,
     ) -> None:
-        self._required = required
-        self._counted = counted
+        self._enough = enough
+        self._trigger = trigger
         self._ticks_hz = ticks_hz
         self._every = every
         self._least_period = least_period
         self._polls: deque[_Poll] = deque()
-        self._is_pausing: dict[int, bool] = {}
+        self._is_pausing: list[bool] = []
         self._paced: set[int] = set()
         self._has_clock = False
 
@@ -141,20 +141,20 @@ class ShareWindow:
     ) -> None:
         """Take the counts as they are now; `clock` is the time by which sets are made, where it is not `now`."""
         had_clock, self._has_clock = self._has_clock, clock is not None
-        if had_clock is not self._has_clock or any(paces[index].first is None for index in self._required):
+        if had_clock is not self._has_clock or not self._have_come(paces):
             # Nothing is known to lie between the times of two clocks.
             self._polls.clear()
         elif self._ticks_hz is not None and self._polls and not self._polls[-1].sets:
             # Nothing counts the ticks before the first set, so the window begins with that set.
             self._polls.clear()
-        inputs = [counts[index] for index in self._counted]
+        inputs = counts
         thinned = tuple([each.dropped.get(DropReason.THINNED, 0) for each in inputs])
         missed = [sum(n for why, n in each.dropped.items() if why not in NO_SET_MISSED) for each in inputs]
         gone = tuple([each.matched + n for each, n in zip(inputs, missed, strict=True)])
         taken = tuple([n + each.buffered for each, n in zip(inputs, gone, strict=True)])
         fed = tuple([each.fed for each in inputs])
         owed = self._owed(fed, paces, now)
-        self._is_pausing = {index: _is_pausing(paces[index], now) for index in self._counted}
+        self._is_pausing = [_is_pausing(pace, now) for pace in paces]
         self._polls.append(_Poll(now, now if clock is None else clock, sets, fed, owed, taken, gone, thinned))
         while len(self._polls) > 1 and (ns := now - self._polls[1].at) >= SHARE_WINDOW_NS:
             if ns <= _LONGEST and self._since(self._polls[1]).possible < _ENOUGH_TO_TELL:
@@ -165,24 +165,27 @@ class ShareWindow:
         """Return the share of the window."""
         return self._since(self._polls[0]) if self._polls else NOT_KNOWN
 
+    def _have_come(self, paces: Sequence[Pace]) -> bool:
+        have = [pace.first is not None for pace in paces]
+        return all(have[index] for index in self._enough(have))
+
     def _owed(self, fed: tuple[int, ...], paces: Sequence[Pace], now: int) -> tuple[float, ...]:
         """Return how many messages each input should have sent by now; while all are away, nothing is owed."""
         if not self._polls:
             return fed
-        for place, index in enumerate(self._counted):
-            if index not in self._paced and (period := paces[index].period) is not None:
+        for index, pace in enumerate(paces):
+            if index not in self._paced and pace.period is not None:
                 self._paced.add(index)
-                self._count_again(place, period, since=paces[index].first)
+                self._count_again(index, pace.period, since=pace.first)
         before = self._polls[-1]
         last = max((each.last for each in paces if each.last is not None), default=before.at)
         owed = []
-        for index, came, owed_before, fed_before in zip(self._counted, fed, before.owed, before.fed, strict=True):
-            period = paces[index].period
-            if period is None:
+        for pace, came, owed_before, fed_before in zip(paces, fed, before.owed, before.fed, strict=True):
+            if pace.period is None:
                 owed.append(owed_before + came - fed_before)
             else:
-                begin = max(before.at, paces[index].first or before.at)
-                owed.append(owed_before + max(0, min(now, round(last + _LATE * period)) - begin) / period)
+                begin = max(before.at, pace.first or before.at)
+                owed.append(owed_before + max(0, min(now, round(last + _LATE * pace.period)) - begin) / pace.period)
         return tuple(owed)
 
     def _count_again(self, place: int, period: float, *, since: int | None) -> None:
@@ -199,12 +202,15 @@ class ShareWindow:
         if self._ticks_hz is not None:
             elapsed = last.clock - first.clock
             return Share(left, self._thinned(int(elapsed * self._ticks_hz / _SECOND / self._every), elapsed), ns)
-        due = [(*self._due(place, first, last), index) for place, index in enumerate(self._counted)]
+        of_all = [(*self._due(index, first, last), index) for index in range(len(last.fed))]
+        # Who is away allows no sets, but is not needed while enough others come.
+        needed = self._enough([allowed - absent for allowed, absent, _ in of_all])
+        due = [of_all[index] for index in (needed if self._trigger is None else [self._trigger])]
         possible = min(due)[0]
         # Of those that limit it about alike, the one whose messages are absent is why.
         alike = (each for each in due if each[0] <= 1 + (1 + _UNSURE) * possible)
         _, absent, pacemaker = max(alike, key=lambda each: (each[1], -each[0]))
-        is_pausing = any(self._is_pausing.values())
+        is_pausing = any(self._is_pausing[index] for _, _, index in due)
         return Share(left, self._thinned(possible, ns), ns, pacemaker, absent, is_pausing=is_pausing)
 
     def _thinned(self, possible: int, ns: int) -> int:

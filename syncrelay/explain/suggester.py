@@ -101,10 +101,10 @@ class Suggester:
     def _window(self) -> Trials:
         config, most = self._config, self._most_messages
         recent = self._recent()
-        paced = [index for index, topic in enumerate(config.topics) if topic.required]
         pacemaker = config.trigger
         if pacemaker is None:
-            pacemaker = min(paced, key=lambda index: _rate(recent[index]))
+            rates = [_rate(each) for each in recent]
+            pacemaker = min(config.enough(rates), key=rates.__getitem__)
         messages = _last(recent, pacemaker)[-most:]
         inputs = as_arrays(messages, len(config.topics))
         return Trials(config, lambda: self._budget.spent_on(messages), inputs, is_window=True)

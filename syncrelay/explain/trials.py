@@ -107,19 +107,29 @@ class Trials:
 
     @cached_property
     def optional(self) -> tuple[int, ...]:
-        """The indices of the optional inputs."""
-        return tuple(index for index, topic in enumerate(self.config.topics) if not topic.required)
+        """The indices of the inputs that a set may lack."""
+        return tuple(index for index in range(len(self.config.topics)) if index not in self._needed)
 
     @cached_property
     def required(self) -> tuple[int, ...]:
         """The required inputs that the group's tolerance is for; all required ones where each has its own."""
-        required = [index for index, topic in enumerate(self.config.topics) if topic.required]
+        required = self._needed
         own = self.config.own_tolerances
         shared = tuple(index for index in required if own[index] is None or index == self.config.trigger)
-        return shared or tuple(required)
+        return shared or required
+
+    @cached_property
+    def _needed(self) -> tuple[int, ...]:
+        """The inputs whose sets are counted: the required ones, and up to a quorum those that send the most."""
+        return self.config.enough([len(each.stamps) for each in self.inputs])
+
+    def _target(self, target: int | None) -> int | None:
+        """Return what is counted for a target: an input that was missing may be one of those that send the most."""
+        return REQUIRED if target in self._needed else target
 
     def possible(self, target: int | None = REQUIRED) -> PossibleSets | None:
         """Return the sets of one moment that the required inputs allow, or those with an optional one."""
+        target = self._target(target)
         if target not in self._targets:
             among = self.required if target is None else (*self.required, target)
             self._targets[target] = possible_sets(self.config, self.inputs, among, is_window=self.is_window)
@@ -132,7 +142,7 @@ class Trials:
 
     def given(self, changes: Changes, target: int | None = REQUIRED, *, within: int | None = None) -> int:
         """Return how many of the possible sets come together with changes; of those `within` a span, where one is."""
-        run = self._run(changes).get(target, _NOTHING)
+        run = self._run(changes).get(self._target(target), _NOTHING)
         return len(run.given) if within is None else int(np.count_nonzero(run.possible <= within))
 
     def is_enough(self, changes: Changes, target: int | None = REQUIRED, *, within: int | None = None) -> bool:
@@ -381,7 +391,7 @@ class Trials:
 
     def apart(self, index: int) -> int:
         """Return how much later after its stamp an input's message comes than the required ones' do; 0 if unknown."""
-        among = {*(at for at, topic in enumerate(self.config.topics) if topic.required), index}
+        among = {*self._needed, index}
         delays = {at: int(quantile(each, 0.5)) for at in among if len(each := self._delays(at))}
         if index not in delays or len(delays) < 2:  # noqa: PLR2004  one alone has no other clock
             return 0

@@ -51,11 +51,11 @@ class DropFates:
         return frozenset(self.dropped.keys() - self.others.keys())
 
 
-def may_set_pace(required: Sequence[bool], *, trigger: int | None, by_clock: bool) -> tuple[int, ...]:
-    """Return the inputs that may set the pace: the trigger, or the required ones; none where a clock makes the sets."""
+def may_set_pace(needed: Sequence[int], *, trigger: int | None, by_clock: bool) -> tuple[int, ...]:
+    """Return the inputs that may set the pace: the trigger, or the needed ones; none where a clock makes the sets."""
     if by_clock:
         return ()
-    return tuple(index for index, needed in enumerate(required) if needed) if trigger is None else (trigger,)
+    return tuple(needed) if trigger is None else (trigger,)
 
 
 def drop_fates(dropped: Sequence[Mapping[DropReason, int]], counted: Sequence[int]) -> tuple[DropFates, ...]:

@@ -101,6 +101,7 @@ class GroupWatch:
         ]
         self._follow_publishers(graph, types, now)
         figures, input_figures = self._observation.figures(now=now)
+        needed = self._observation.needed
         rows = zip(
             self.config.topics,
             graph,
@@ -120,7 +121,8 @@ class GroupWatch:
                 InputFacts(
                     graph=shown,
                     type=type_name,
-                    required=topic.required,
+                    required=index in needed,
+                    in_quorum=topic.in_quorum,
                     counts=counts,
                     figures=seen,
                     key=key,
@@ -128,7 +130,7 @@ class GroupWatch:
                     served_since=since,
                     own_tolerance=own,
                 )
-                for topic, shown, type_name, counts, seen, key, since, own in rows
+                for index, (topic, shown, type_name, counts, seen, key, since, own) in enumerate(rows)
             ),
             figures=figures,
             tolerance=options.tolerance,

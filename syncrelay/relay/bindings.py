@@ -37,8 +37,9 @@ class GroupBinding:
         """What keeps the group from giving sets, in words."""
         if self.group.failure is not None:
             return "a reload or restart: a bug stopped it"
-        required = [each for each in self.inputs if self.group.config.topics[each.output.index].required]
-        missing = ", ".join(filter(None, (each.missing for each in required)))
+        there = [not each.missing for each in sorted(self.inputs, key=lambda each: each.output.index)]
+        needed = self.group.config.enough(there)
+        missing = ", ".join(filter(None, (each.missing for each in self.inputs if each.output.index in needed)))
         if self.group.sleeps and self.publishers and not missing:
             return f"a subscriber of {one_of(each.topic_name for each in self.publishers)}"
         return missing or None

@@ -171,7 +171,7 @@ class Input:
     output: Text
     """The topic that its messages are republished on."""
     required: bool
-    """Whether every set needs a message of it."""
+    """Whether every set needs a message of it, or it is one of those of which a set needs as many as `quorum` says."""
     offset_ms: Number = 0.0
     """What the file adds to its stamps for matching."""
     rate_hz: Rate

@@ -179,7 +179,7 @@ def _input(facts: GroupFacts, index: int, fates: DropFates, lately: DropFates) -
         topic=each.name,
         type=each.type,
         output=each.output,
-        required=each.required,
+        required=each.required or each.in_quorum,
         offset_ms=_in_ms(each.offset),
         rate_hz=round(figures.rate_hz, 3),
         age_ms=None if figures.last_received is None else _in_ms(facts.figures.now - figures.last_received),

@@ -30,9 +30,9 @@ class ApproximateEpsilonTime(Queued):
             raise ValueError(f"epsilon_ns {epsilon_ns} must be 0 or more")
         self._epsilon = epsilon_ns
 
-    def for_required(self, required: Sequence[bool]) -> tuple["ApproximateEpsilonTime", OptionalInputs]:
+    def for_required(self, required: Sequence[bool], quorum: int) -> tuple["ApproximateEpsilonTime", OptionalInputs]:
         size, epsilon = self._queue_size, self._epsilon
-        stage = OptionalInputs(required=required, queue_size=size, slop_ns=epsilon)
+        stage = OptionalInputs(required=required, quorum=quorum, queue_size=size, slop_ns=epsilon)
         return ApproximateEpsilonTime(n_inputs=sum(required), queue_size=size, epsilon_ns=epsilon), stage
 
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:

@@ -69,7 +69,7 @@ class ApproximateTime(Queued):
         self.make_queues(n_inputs, queue_size)
         if slop_ns < 0 or not 0 <= age_penalty < float("inf"):
             raise ValueError(f"slop_ns {slop_ns} and age_penalty {age_penalty} must be 0 or more")
-        if len(periods) != n_inputs or min(periods) < 0:
+        if len(periods) != n_inputs or any(period < 0 for period in periods):
             raise ValueError(f"min_periods_ns {periods} must be {n_inputs} numbers, 0 or more")
         self._slop = slop_ns
         self._age_penalty = age_penalty
@@ -83,7 +83,7 @@ class ApproximateTime(Queued):
         self.waits_started = 0
         self._reset()
 
-    def for_required(self, required: Sequence[bool]) -> tuple["ApproximateTime", OptionalInputs]:
+    def for_required(self, required: Sequence[bool], quorum: int) -> tuple["ApproximateTime", OptionalInputs]:
         policy = ApproximateTime(
             n_inputs=sum(required),
             queue_size=self._queue_size,
@@ -93,6 +93,7 @@ class ApproximateTime(Queued):
         )
         stage = OptionalInputs(
             required=required,
+            quorum=quorum,
             queue_size=self._queue_size,
             slop_ns=self._slop,
             min_periods_ns=self._min_periods,

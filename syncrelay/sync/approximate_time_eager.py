@@ -34,9 +34,9 @@ class ApproximateTimeEager(Queued):
         self._slop = slop_ns
         self._stamps = [queue.stamps for queue in self._queues]
 
-    def for_required(self, required: Sequence[bool]) -> tuple["ApproximateTimeEager", OptionalInputs]:
+    def for_required(self, required: Sequence[bool], quorum: int) -> tuple["ApproximateTimeEager", OptionalInputs]:
         size, slop = self._queue_size, self._slop
-        stage = OptionalInputs(required=required, queue_size=size, slop_ns=slop)
+        stage = OptionalInputs(required=required, quorum=quorum, queue_size=size, slop_ns=slop)
         return ApproximateTimeEager(n_inputs=sum(required), queue_size=size, slop_ns=slop), stage
 
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:

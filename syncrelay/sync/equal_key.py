@@ -38,8 +38,10 @@ class EqualKey(Policy):
         self._losses = Losses(n_inputs)
         self._reset()
 
-    def for_required(self, required: Sequence[bool]) -> tuple["EqualKey", OptionalKeys]:
-        stage = OptionalKeys(required=required, queue_size=self._queue_size)
+    def for_required(self, required: Sequence[bool], quorum: int) -> tuple["EqualKey", OptionalKeys]:
+        if not any(required):
+            raise ValueError(f"required {required} must be one or more: whose keys make the sets")
+        stage = OptionalKeys(required=required, quorum=quorum, queue_size=self._queue_size)
         return EqualKey(n_inputs=sum(required), queue_size=self._queue_size), stage
 
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:

@@ -31,8 +31,8 @@ class ExactTime(Policy):
         self._order: list[int] = []
         self._losses = Losses(n_inputs)
 
-    def for_required(self, required: Sequence[bool]) -> tuple["ExactTime", OptionalInputs]:
-        stage = OptionalInputs(required=required, queue_size=self._queue_size, slop_ns=0)
+    def for_required(self, required: Sequence[bool], quorum: int) -> tuple["ExactTime", OptionalInputs]:
+        stage = OptionalInputs(required=required, quorum=quorum, queue_size=self._queue_size, slop_ns=0)
         return ExactTime(n_inputs=sum(required), queue_size=self._queue_size), stage
 
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:

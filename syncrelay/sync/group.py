@@ -20,7 +20,8 @@ class SyncGroup(Generic[T]):
     - A stamp more than a second below its input's newest flushes the group (`time_jump`), which forgets the time
       before. What other inputs still send of that time is dropped for the same reason.
     - Inputs that are not `required` never change which messages of the required ones are a set. A set leaves when no
-      better message of them can come, or `max_wait_ns` after its required messages were all there.
+      better message of them can come, or `max_wait_ns` after its required messages were all there, and messages of
+      `quorum` inputs in all. Where no input is required, a set is any so many messages that fit.
     - `max_wait_ns` after a first complete set was there, the best set so far leaves. Without it, a set waits as long as
       the policy has it wait, and only latest_time, whose sets do not wait for others, may have optional inputs.
     - Where a clock triggers, `now` is the time of that clock, in nanoseconds since the epoch of the stamps. The set of
@@ -52,6 +53,7 @@ class SyncGroup(Generic[T]):
         policy: Policy,
         *,
         required: Sequence[bool] | None = None,
+        quorum: int | None = None,
         max_wait_ns: int | None = None,
         offsets_ns: Sequence[int] | None = None,
         restamp: Restamp | int | None = None,
@@ -63,14 +65,18 @@ class SyncGroup(Generic[T]):
         """Run a policy that has not been fed anything.
 
         `required` (default: all), and `offsets_ns`, which is added to the stamps for matching, have a value for each
-        input. At most `most_waiting` sets wait for transforms. Durations are in nanoseconds. Raises ValueError for what
-        is not so, or cannot be.
+        input. `quorum` is how many inputs a set needs, the required ones included (default: no more than these). At
+        most `most_waiting` sets wait for transforms. Durations are in nanoseconds. Raises ValueError for what is not
+        so, or cannot be.
         """
         n_inputs = policy.n_inputs
         required = (True,) * n_inputs if required is None else required
         offsets = (0,) * n_inputs if offsets_ns is None else tuple(offsets_ns)
-        if len(required) != n_inputs or len(offsets) != n_inputs or not any(required):
-            raise ValueError(f"required {required} and offsets_ns {offsets} must be {n_inputs}, one required")
+        needed = sum(required) if quorum is None else quorum
+        if len(required) != n_inputs or len(offsets) != n_inputs or not 0 < needed <= n_inputs:
+            raise ValueError(
+                f"required {required} and offsets_ns {offsets} must be {n_inputs}, one required, quorum {quorum}"
+            )
         if max_wait_ns is not None and max_wait_ns < 0:
             raise ValueError(f"max_wait_ns {max_wait_ns} must be 0 or more")
         if isinstance(restamp, int) and not 0 <= restamp < n_inputs:
@@ -95,10 +101,15 @@ class SyncGroup(Generic[T]):
         self._is_limited = max_wait_ns is not None or policy.by_clock or transforms is not None
         self._matching: Prompt | Limited
         if policy.by_clock or max_wait_ns is None:
-            self._matching = Prompt(policy, required=required, max_wait_ns=max_wait_ns or 0)
+            self._matching = Prompt(policy, required=required, quorum=needed, max_wait_ns=max_wait_ns or 0)
         else:
             self._matching = Limited(
-                policy, self._arrivals, required=required, max_wait_ns=max_wait_ns, offsets_ns=offsets
+                policy,
+                self._arrivals,
+                required=required,
+                quorum=needed,
+                max_wait_ns=max_wait_ns,
+                offsets_ns=offsets,
             )
         self._feed = self._matching.feed
 
@@ -237,12 +248,17 @@ class SyncGroup(Generic[T]):
         return left
 
     def _moment(self, match: Match, now: int) -> int:
-        """Return a stamp that rises from set to set: the tick, or the latest of the required inputs, or `now`."""
+        """Return a stamp that rises from set to set: the tick, the latest of the required inputs, or `now`.
+
+        Where none is required, it is that of the first message: the set was made round it.
+        """
         if match.tick is not None:
             return match.tick
         stamps = [
             message.stamp + self._offsets[message.input]
             for message in match.messages
-            if message is not None and message.stamp and message.input in self._required
+            if message is not None and message.stamp and (message.input in self._required or not self._required)
         ]
+        if not self._required:
+            return stamps[0]
         return max(stamps, default=now)

@@ -52,6 +52,7 @@ class LatestAtTicks(Queued):
         "_passed",
         "_queue_size",
         "_queues",
+        "_quorum",
         "_required",
         "_until",
         "n_inputs",
@@ -69,28 +70,31 @@ class LatestAtTicks(Queued):
         ticks: Ticks,
         max_ages_ns: Sequence[int | None] | None = None,
         required: Sequence[bool] | None = None,
+        quorum: int = 0,
     ) -> None:
         self.make_queues(n_inputs, queue_size)
         needed = (True,) * n_inputs if required is None else tuple(required)
-        if len(needed) != n_inputs or not any(needed):
-            raise ValueError(f"required {needed} must be {n_inputs}, one required")
+        if len(needed) != n_inputs or not (any(needed) or 0 < quorum <= n_inputs):
+            raise ValueError(f"required {needed} must be {n_inputs}, one required, or quorum {quorum} from 1")
         self.ticks = ticks
         self._max_ages = check_max_ages(max_ages_ns, n_inputs)
         self._required = needed
+        self._quorum = quorum
         # The last tick that has passed, the time that was reached, and the time when the last message was fed.
         self._passed = -1
         self._until = 0
         self._fed_until = -REST_NS
 
-    def for_required(self, required: Sequence[bool]) -> tuple["LatestAtTicks", OptionalInputs]:
+    def for_required(self, required: Sequence[bool], quorum: int) -> tuple["LatestAtTicks", OptionalInputs]:
         policy = LatestAtTicks(
             n_inputs=self.n_inputs,
             queue_size=self._queue_size,
             ticks=self.ticks,
             max_ages_ns=self._max_ages,
             required=required,
+            quorum=quorum,
         )
-        return policy, OptionalInputs(required=(True,) * self.n_inputs, queue_size=1, slop_ns=0)
+        return policy, OptionalInputs(required=(True,) * self.n_inputs, quorum=0, queue_size=1, slop_ns=0)
 
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
         queue = self._queues[place]
@@ -133,20 +137,19 @@ class LatestAtTicks(Queued):
         self._until = until
 
     def _next_possible(self) -> int | None:
-        """Return the next tick at which every required input has a message."""
+        """Return the next tick at which every required input has a message, and as many inputs as are needed."""
         tick = self._passed + 1
         last = self.ticks.last_until(self._fed_until + REST_NS)
         while tick <= last:
-            needed = tick
-            for place, is_needed in enumerate(self._required):
-                if is_needed:
-                    served = self._first_served(place, tick)
-                    if served is None:
-                        return None
-                    needed = max(needed, served)
-            if needed == tick:
+            served = [self._first_served(place, tick) for place in range(self.n_inputs)]
+            enough = sorted(first for first in served if first is not None)[: self._quorum]
+            needed = [first for first, is_needed in zip(served, self._required, strict=True) if is_needed]
+            if None in needed or len(enough) < self._quorum:
+                return None
+            latest = max(filter(None, (*needed, *enough)), default=tick)
+            if latest == tick:
                 return tick
-            tick = needed
+            tick = latest
         return None
 
     def _first_served(self, place: int, tick: int) -> int | None:

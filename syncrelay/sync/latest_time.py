@@ -2,6 +2,7 @@
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
+from operator import ge
 from typing import NamedTuple
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
@@ -29,8 +30,8 @@ class LatestTime(Queued):
 
     None is older at the trigger's stamp than its input's of `max_ages_ns` (None: any age will do). A message may
     serve many sets. A trigger waits for required inputs that have nothing for it yet, and is too far once one of them
-    has shown newer messages only; it never waits for optional ones. `release_oldest` lets the oldest waiting trigger
-    expire.
+    has shown newer messages only; so it does where fewer than `quorum` inputs have a message for it. It never waits for
+    more of them. `release_oldest` lets the oldest waiting trigger expire.
 
         lidar |..a..b.c...d
         odom  |.A.B......D.
@@ -50,6 +51,7 @@ class LatestTime(Queued):
         "_max_ages",
         "_queue_size",
         "_queues",
+        "_quorum",
         "_required",
         "_trigger",
         "n_inputs",
@@ -67,6 +69,7 @@ class LatestTime(Queued):
         trigger: int,
         max_ages_ns: Sequence[int | None] | None = None,
         required: Sequence[bool] | None = None,
+        quorum: int = 0,
     ) -> None:
         self.make_queues(n_inputs, queue_size)
         needed = (True,) * n_inputs if required is None else tuple(required)
@@ -75,18 +78,20 @@ class LatestTime(Queued):
         self._trigger = trigger
         self._max_ages = check_max_ages(max_ages_ns, n_inputs)
         self._required = needed
+        self._quorum = quorum
         self.waits_started = 0
         self.waits_ended = 0
 
-    def for_required(self, required: Sequence[bool]) -> tuple["LatestTime", OptionalInputs]:
+    def for_required(self, required: Sequence[bool], quorum: int) -> tuple["LatestTime", OptionalInputs]:
         policy = LatestTime(
             n_inputs=self.n_inputs,
             queue_size=self._queue_size,
             trigger=self._trigger,
             max_ages_ns=self._max_ages,
             required=required,
+            quorum=quorum,
         )
-        return policy, OptionalInputs(required=(True,) * self.n_inputs, queue_size=1, slop_ns=0)
+        return policy, OptionalInputs(required=(True,) * self.n_inputs, quorum=0, queue_size=1, slop_ns=0)
 
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
         queue = self._queues[place]
@@ -129,16 +134,17 @@ class LatestTime(Queued):
         while triggers.stamps:
             stamp = triggers.stamps[0]
             found = [self._look_up(place, stamp) for place in range(self.n_inputs)]
-            missing = [
-                near for near, needed in zip(found, self._required, strict=True) if needed and near.position is None
-            ]
-            if not missing:
+            if self._are_enough([near.position is not None for near in found]):
                 self._emit([near.position for near in found], stamp, outcomes)
-            elif all(near.may_come for near in missing):
+            elif self._are_enough([near.may_come for near in found]):
                 return
             else:
                 self._note_missed(stamp)
                 outcomes += self._drop_trigger(DropReason.TOO_FAR)
+
+    def _are_enough(self, there: Sequence[bool]) -> bool:
+        """Whether a set may leave with the inputs that are there."""
+        return sum(there) >= self._quorum and all(map(ge, there, self._required))
 
     def _look_up(self, place: int, stamp: int) -> _Lookup:
         stamps, max_age = self._queues[place].stamps, self._max_ages[place]

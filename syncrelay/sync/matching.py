@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 from syncrelay.sync.arrivals import Arrivals
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
-from syncrelay.sync.optional import Waiting
 from syncrelay.sync.policy import Policy
+from syncrelay.sync.waiting import Waiting
 
 
 class Prompt:
@@ -19,8 +19,8 @@ class Prompt:
 
     __slots__ = ("_max_wait", "_policy", "feed")
 
-    def __init__(self, policy: Policy, *, required: Sequence[bool], max_wait_ns: int) -> None:
-        self._policy, stage = policy.for_required(required)
+    def __init__(self, policy: Policy, *, required: Sequence[bool], quorum: int, max_wait_ns: int) -> None:
+        self._policy, stage = policy.for_required(required, quorum)
         if stage.inputs:
             raise ValueError("an optional input needs max_wait_ns: a set would wait for it without end")
         self._max_wait = max_wait_ns
@@ -51,7 +51,7 @@ class Prompt:
 
 
 class Limited:
-    """A set waits no longer than `max_wait_ns` from when its required messages are all there.
+    """A set waits no longer than `max_wait_ns` from when its required messages, and enough others, are there.
 
     A wait counts from the `now` at which the message that began it was fed. Where `now` falls, all waits count from
     the new `now`, so that no set waits longer.
@@ -76,10 +76,11 @@ class Limited:
         arrivals: Arrivals,
         *,
         required: Sequence[bool],
+        quorum: int,
         max_wait_ns: int,
         offsets_ns: Sequence[int],
     ) -> None:
-        self._policy, self._stage = policy.for_required(required)
+        self._policy, self._stage = policy.for_required(required, quorum)
         taken = [index for index in range(policy.n_inputs) if index not in self._stage.inputs]
         self._places = {index: place for place, index in enumerate(taken)}
         self._arrivals = arrivals
@@ -92,7 +93,7 @@ class Limited:
     def feed(self, index: int, stamp: int, message: Message) -> Sequence[Outcome]:
         place = self._places.get(index)
         if place is None:
-            outcomes = self._stage.put(index, stamp, message)
+            outcomes = self._stage.put(index, stamp, message, self._now)
         else:
             outcomes = self._join(self._policy.feed(place, stamp, message), self._now)
         return [*outcomes, *self.due(self._now)]
@@ -126,7 +127,7 @@ class Limited:
         return drops
 
     def let_go(self, reason: DropReason) -> list[Drop]:
-        drops = self._policy.let_go(reason) + self._stage.flush(reason)
+        drops = self._policy.let_go(reason) + self._stage.let_go(reason)
         self._note_waits(self._now)
         return drops
 

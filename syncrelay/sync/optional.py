@@ -1,83 +1,23 @@
-"""The stages where sets of the required inputs wait for messages of the optional ones: by stamps, and by keys."""
+"""The stages where messages of inputs that may be missing join sets: by stamps, and by keys."""
 
 from bisect import bisect_left, bisect_right
 from collections import deque
-from collections.abc import Hashable, Mapping, Sequence, Sized
-from typing import NamedTuple, Protocol
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from typing import Final, NamedTuple
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.queues import StampQueue
+from syncrelay.sync.waiting import OptionalStage, Seed, Waiting
+
+_EARLIEST: Final = -(2**63)
 
 
-class Waiting(NamedTuple):
-    """A set of the required inputs: None for the optional ones, its least and greatest stamp, when its wait began."""
+class _Last(NamedTuple):
+    """The last set: the stamp that it was made round, the last stamp that would have fitted, its inputs."""
 
-    messages: tuple[Message | None, ...]
-    low: int
-    high: int
-    since: int
-
-
-class OptionalStage(Protocol):
-    """Adds messages of the optional `inputs` to the sets of the required ones, which leave in the order they come.
-
-    A set leaves when it is decided what it takes, when `queue_size` sets wait behind it, or when `leave` is called.
-    """
-
-    inputs: Sequence[int]
-    queue_size: int
-    waiting: deque[Waiting]
-    queues: Mapping[int, Sized]
-
-    @property
-    def oldest_since(self) -> int | None:
-        """When the oldest set began to wait."""
-        return self.waiting[0].since if self.waiting else None
-
-    def wait_from(self, now: int) -> None:
-        """Let no wait have begun later than `now`, because the clock fell."""
-        self.waiting = deque(waiting._replace(since=min(waiting.since, now)) for waiting in self.waiting)
-
-    def hold(self, waiting: Waiting) -> list[Outcome]:
-        """Take a set of the required inputs; return what leaves."""
-        self.waiting.append(waiting)
-        outcomes = self.leave_decided()
-        if len(self.waiting) > self.queue_size:
-            outcomes += self.leave()
-        return outcomes
-
-    def leave_decided(self) -> list[Outcome]:
-        """Let sets leave while nothing that may still come changes the oldest one."""
-        outcomes: list[Outcome] = []
-        while self.waiting and all(self.is_decided(index) for index in self.inputs):
-            outcomes += self.leave()
-        return outcomes
-
-    def flush(self, reason: DropReason) -> list[Drop]:
-        """Drop everything, and be as new."""
-        held = [message for waiting in self.waiting for message in waiting.messages if message is not None]
-        self.waiting.clear()
-        return [Drop(message, reason) for message in held + self.empty()]
-
-    def buffered(self, index: int) -> int:
-        """How many messages of this input, required or not, are in here."""
-        return sum(waiting.messages[index] is not None for waiting in self.waiting) + len(self.queues.get(index, ()))
-
-    def put(self, index: int, stamp: int, message: Message) -> list[Outcome]:
-        """Take a message of an optional input; return what leaves because of it."""
-        ...
-
-    def leave(self) -> list[Outcome]:
-        """Let the oldest set leave with what there is."""
-        ...
-
-    def is_decided(self, index: int) -> bool:
-        """Whether no later message of this input can be better for the oldest set than the best one so far."""
-        ...
-
-    def empty(self) -> list[Message]:
-        """Return all messages of optional inputs, and forget what these have sent."""
-        ...
+    stamp: int
+    reach: int
+    inputs: frozenset[int]
 
 
 class OptionalInputs(OptionalStage):
@@ -86,73 +26,115 @@ class OptionalInputs(OptionalStage):
     It is decided when no later message of any optional input can be nearer. A message goes to the nearer of two sets
     that wait. It is superseded when a newer one of its input went into a set, and too far when it is too old for every
     set to come.
+
+    Where no input is required, a set is made round a message: where enough inputs have messages within slop, that of
+    the first of them in their order. So sets are made round the messages of the first input while these come. A message
+    that is not newer than the one that the last set was made round is late, and those that the last set left without
+    make none of their own.
     """
 
     def __init__(
         self,
         *,
         required: Sequence[bool],
+        quorum: int,
         queue_size: int,
         slop_ns: int,
         min_periods_ns: Sequence[int] | None = None,
     ) -> None:
         self.inputs = [index for index, needed in enumerate(required) if not needed]
+        self.quorum = quorum
         self.queue_size = queue_size
-        self.queues: dict[int, StampQueue] = {index: StampQueue() for index in self.inputs}
         self.waiting = deque()
+        self.came = {index: {} for index in self.inputs}
+        self._queues = {index: StampQueue() for index in self.inputs}
         self._slop = slop_ns
         self._least_steps = [max(1, period) for period in min_periods_ns or (1,) * len(required)]
         self._newest: dict[int, int] = {}
+        self._is_any = not any(required)
+        self._nothing = (None,) * len(required)
+        self._last: _Last | None = None
 
-    def put(self, index: int, stamp: int, message: Message) -> list[Outcome]:
-        queue = self.queues[index]
+    def put(self, index: int, stamp: int, message: Message, now: int) -> list[Outcome]:
+        if self._last is not None and stamp <= self._last.stamp:
+            return [Drop(message, DropReason.LATE)]
+        queue = self._queues[index]
         outcomes: list[Outcome] = []
         replaced = queue.insert(stamp, message)
         if replaced is not None:
             outcomes.append(Drop(replaced, DropReason.DUPLICATE))
+        self.came[index].setdefault(stamp, now)
         self._newest[index] = max(stamp, self._newest.get(index, stamp))
         outcomes += self.leave_decided()
+        if self._is_any:
+            outcomes += self._drop_alone()
         if len(queue) > self.queue_size:
-            outcomes += queue.drop(1, DropReason.OVERFLOW)
+            outcomes += self._drop(index, 1, DropReason.OVERFLOW)
         return outcomes
 
-    def leave(self) -> list[Outcome]:
-        waiting = self.waiting[0]
-        messages = list(waiting.messages)
+    def seeds(self) -> Iterator[Seed]:
+        return self._around_messages() if self._is_any else super().seeds()
+
+    def chosen(self, seed: Seed) -> dict[int, int]:
+        waiting, _ = seed
         low, high = waiting.low, waiting.high
+        chosen = {}
+        for index, queue in self._queues.items():
+            position = self._nearest(seed, queue.stamps, low, high)
+            if position is not None:
+                stamp = chosen[index] = queue.stamps[position]
+                low, high = min(low, stamp), max(high, stamp)
+        return chosen
+
+    def complete(self, seed: Seed) -> list[Outcome]:
+        waiting, _ = seed
+        messages, chosen = list(waiting.messages), self.chosen(seed)
+        useless = waiting.high - self._slop
+        if self._is_any:
+            useless = waiting.low
+            lowest = min(chosen.values())
+            self._last = _Last(useless, lowest + self._slop, frozenset(chosen))
         drops: list[Drop] = []
-        for index, queue in self.queues.items():
-            position = self._nearest(waiting, queue.stamps, low, high)
-            if position is None:
-                drops += queue.drop(bisect_right(queue.stamps, waiting.high - self._slop), DropReason.TOO_FAR)
-                continue
-            low, high = min(low, queue.stamps[position]), max(high, queue.stamps[position])
-            drops += queue.drop(position, DropReason.SUPERSEDED)
-            messages[index] = queue.remove(0)
-        self.waiting.popleft()
+        for index, queue in self._queues.items():
+            if index in chosen:
+                drops += self._drop(index, bisect_left(queue.stamps, chosen[index]), DropReason.SUPERSEDED)
+                del self.came[index][chosen[index]]
+                messages[index] = queue.remove(0)
+            else:
+                drops += self._drop(index, bisect_right(queue.stamps, useless), DropReason.TOO_FAR)
+        if self.waiting:
+            self.waiting.popleft()
         return [*drops, Match(tuple(messages))]
 
-    def is_decided(self, index: int) -> bool:
-        newest = self._newest.get(index)
-        if newest is None:
-            return False
-        waiting = self.waiting[0]
-        next_stamp = newest + self._least_steps[index]
-        stamps = self.queues[index].stamps
-        position = self._nearest(waiting, stamps, waiting.low, waiting.high)
-        if position is None:
-            return next_stamp > self._last_fitting(waiting, waiting.low)
-        mirrored = waiting.low + waiting.high - stamps[position]
-        return next_stamp >= mirrored
+    def is_decided(self, seed: Seed) -> bool:
+        return all(self._is_decided(index, seed) for index in self.inputs)
+
+    def flush(self, reason: DropReason) -> list[Drop]:
+        self._last = None
+        return super().flush(reason)
 
     def empty(self) -> list[Message]:
         self._newest.clear()
-        return [message for queue in self.queues.values() for message in queue.take(len(queue))]
+        return [message for queue in self._queues.values() for message in queue.take(len(queue))]
 
-    def _nearest(self, waiting: Waiting, stamps: list[int], low: int, high: int) -> int | None:
+    def _is_decided(self, index: int, seed: Seed) -> bool:
+        newest = self._newest.get(index)
+        if newest is None:
+            return False
+        waiting, following = seed
+        next_stamp = newest + self._least_steps[index]
+        stamps = self._queues[index].stamps
+        position = self._nearest(seed, stamps, waiting.low, waiting.high)
+        if position is None:
+            return next_stamp > self._last_fitting(waiting, following, waiting.low)
+        mirrored = waiting.low + waiting.high - stamps[position]
+        return next_stamp >= mirrored
+
+    def _nearest(self, seed: Seed, stamps: list[int], low: int, high: int) -> int | None:
         """Return the place of the stamp nearest to the set's middle within slop; of two equally near, the older."""
+        waiting, following = seed
         first = bisect_left(stamps, high - self._slop)
-        end = bisect_right(stamps, self._last_fitting(waiting, low))
+        end = bisect_right(stamps, self._last_fitting(waiting, following, low))
         if first >= end:
             return None
         after = min(max(bisect_left(stamps, -(-(waiting.low + waiting.high) // 2)), first), end - 1)
@@ -161,13 +143,73 @@ class OptionalInputs(OptionalStage):
         is_before = waiting.low + waiting.high - 2 * stamps[before]
         return after if abs(is_after) < abs(is_before) else before
 
-    def _last_fitting(self, waiting: Waiting, low: int) -> int:
-        """Return the last stamp within slop of `low` that is not nearer to the next waiting set."""
+    def _last_fitting(self, waiting: Waiting, following: Waiting | None, low: int) -> int:
+        """Return the last stamp within slop of `low` that is not nearer to the next set."""
         last = low + self._slop
-        if len(self.waiting) > 1:
-            following = self.waiting[1]
+        if following is not None:
             last = min(last, (waiting.low + waiting.high + following.low + following.high) // 4)
         return last
+
+    def _around_messages(self) -> Iterator[Seed]:
+        """Yield the sets that may leave where no input is required, the oldest first."""
+        places = dict.fromkeys(self.inputs, 0)
+        while True:
+            stamps = {index: self._queues[index].stamps for index in places}
+            heads = {index: stamps[index][place] for index, place in places.items() if place < len(stamps[index])}
+            if len(heads) < self.quorum:
+                return
+            oldest, begin = min(heads.values()), sorted(heads.values())[self.quorum - 1] - self._slop
+            if oldest < begin:
+                # No set of enough inputs holds what is before.
+                places = {index: bisect_left(stamps[index], begin, places[index]) for index in heads}
+                continue
+            leader = self._leader(heads, oldest)
+            place = places[leader]
+            here, *following = [self._around(stamp) for stamp in stamps[leader][place : place + 2]]
+            seed = here, following[0] if following else None
+            if self._since(seed) is not None and self._is_new(seed):
+                yield seed
+            places[leader] = place + 1
+
+    def _around(self, stamp: int) -> Waiting:
+        return Waiting(self._nothing, stamp, stamp, _EARLIEST)
+
+    def _is_new(self, seed: Seed) -> bool:
+        """Whether a set is of another moment than the last, and not of those that were missing there."""
+        last = self._last
+        return last is None or any(
+            index in last.inputs or stamp > last.reach for index, stamp in self.chosen(seed).items()
+        )
+
+    def _leader(self, heads: Mapping[int, int], oldest: int) -> int:
+        """Return the first input with a message within slop of the oldest one, or of one that is near that."""
+        leader, near = max(heads), oldest
+        for index, head in reversed(list(heads.items())):
+            if head <= near + self._slop:
+                leader, near = index, head
+        return leader
+
+    def _drop_alone(self) -> list[Drop]:
+        """Drop the oldest messages that can be in no set of enough inputs any more."""
+        drops: list[Drop] = []
+        while firsts := {index: queue.stamps[0] for index, queue in self._queues.items() if queue.stamps}:
+            index = min(firsts, key=firsts.__getitem__)
+            last = firsts[index] + self._slop
+            if sum(self._may_have(other, last) for other in self.inputs) >= self.quorum:
+                break
+            drops += self._drop(index, 1, DropReason.TOO_FAR)
+        return drops
+
+    def _may_have(self, index: int, last: int) -> bool:
+        """Whether an input has or may still send a message up to this stamp."""
+        stamps, newest = self._queues[index].stamps, self._newest.get(index)
+        return newest is None or newest + self._least_steps[index] <= last or (bool(stamps) and stamps[0] <= last)
+
+    def _drop(self, index: int, count: int, reason: DropReason) -> list[Drop]:
+        queue = self._queues[index]
+        for stamp in queue.stamps[:count]:
+            del self.came[index][stamp]
+        return queue.drop(count, reason)
 
 
 class OptionalKeys(OptionalStage):
@@ -177,45 +219,58 @@ class OptionalKeys(OptionalStage):
     a set, those of its input that came before it or have an older stamp are superseded.
     """
 
-    def __init__(self, *, required: Sequence[bool], queue_size: int) -> None:
+    def __init__(self, *, required: Sequence[bool], quorum: int, queue_size: int) -> None:
         self.inputs = [index for index, needed in enumerate(required) if not needed]
+        self.quorum = quorum
         self.queue_size = queue_size
-        self.queues: dict[int, dict[Hashable, Message]] = {index: {} for index in self.inputs}
         self.waiting = deque()
+        self.came = {index: {} for index in self.inputs}
+        self._queues: dict[int, dict[Hashable, Message]] = {index: {} for index in self.inputs}
 
-    def put(self, index: int, stamp: int, message: Message) -> list[Outcome]:
+    def put(self, index: int, stamp: int, message: Message, now: int) -> list[Outcome]:
         del stamp
-        queue = self.queues[index]
+        queue = self._queues[index]
         replaced = queue.pop(message.key, None)
         outcomes: list[Outcome] = [] if replaced is None else [Drop(replaced, DropReason.DUPLICATE)]
         queue[message.key] = message
+        self.came[index].setdefault(message.key, now)
         outcomes += self.leave_decided()
         if len(queue) > self.queue_size:
-            outcomes.append(Drop(queue.pop(next(iter(queue))), DropReason.OVERFLOW))
+            outcomes.append(Drop(self._take(index, next(iter(queue))), DropReason.OVERFLOW))
         return outcomes
 
-    def leave(self) -> list[Outcome]:
-        waiting = self.waiting.popleft()
+    def chosen(self, seed: Seed) -> dict[int, Hashable]:
+        key = _key(seed[0])
+        return {index: key for index, queue in self._queues.items() if key in queue}
+
+    def complete(self, seed: Seed) -> list[Outcome]:
+        waiting, _ = seed
         messages = list(waiting.messages)
         drops: list[Drop] = []
-        for index, queue in self.queues.items():
-            member = messages[index] = queue.get(_key(waiting))
-            if member is not None:
-                keys = list(queue)
-                position = keys.index(member.key)
-                older = keys[:position] + [key for key in keys[position:] if queue[key].stamp < member.stamp]
-                drops += [Drop(queue.pop(key), DropReason.SUPERSEDED) for key in older]
-                del queue[member.key]
+        for index, key in self.chosen(seed).items():
+            queue = self._queues[index]
+            keys, member = list(queue), queue[key]
+            position = keys.index(key)
+            older = keys[:position] + [other for other in keys[position:] if queue[other].stamp < member.stamp]
+            drops += [Drop(self._take(index, other), DropReason.SUPERSEDED) for other in older]
+            messages[index] = self._take(index, key)
+        self.waiting.popleft()
         return [*drops, Match(tuple(messages))]
 
-    def is_decided(self, index: int) -> bool:
-        return any(_key(waiting) in self.queues[index] for waiting in self.waiting)
+    def is_decided(self, seed: Seed) -> bool:
+        del seed
+        keys = [_key(waiting) for waiting in self.waiting]
+        return all(any(key in queue for key in keys) for queue in self._queues.values())
 
     def empty(self) -> list[Message]:
-        queued = [message for queue in self.queues.values() for message in queue.values()]
-        for queue in self.queues.values():
+        queued = [message for queue in self._queues.values() for message in queue.values()]
+        for queue in self._queues.values():
             queue.clear()
         return queued
+
+    def _take(self, index: int, key: Hashable) -> Message:
+        del self.came[index][key]
+        return self._queues[index].pop(key)
 
 
 def _key(waiting: Waiting) -> Hashable:

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from syncrelay.sync.messages import Drop, DropReason, Message, Outcome
-from syncrelay.sync.optional import OptionalStage
 from syncrelay.sync.queues import Losses, StampQueue
+from syncrelay.sync.waiting import OptionalStage
 
 
 class Policy(Protocol):
@@ -34,12 +34,12 @@ class Policy(Protocol):
     n_inputs: int
     """How many inputs a set has."""
 
-    def for_required(self, required: Sequence[bool]) -> tuple["Policy", OptionalStage]:
+    def for_required(self, required: Sequence[bool], quorum: int) -> tuple["Policy", OptionalStage]:
         """Return a new policy of the same options for a group in which only some inputs are required.
 
         It is either a policy of the required inputs alone, with places counted among them, and the stage where
         messages of the optional inputs join its sets; or a policy that deals with optional inputs itself, and a stage
-        without inputs.
+        without inputs. A set has messages of `quorum` inputs or more. Where no input is required, the policy has none.
         """
         ...
 
@@ -113,8 +113,8 @@ class Queued(Policy, Protocol):
 
 def check_sizes(n_inputs: int, queue_size: int) -> None:
     """Raise ValueError for sizes that no policy can have."""
-    if n_inputs < 1 or queue_size < 1:
-        raise ValueError(f"n_inputs {n_inputs} and queue_size {queue_size} must be 1 or more")
+    if n_inputs < 0 or queue_size < 1:
+        raise ValueError(f"n_inputs {n_inputs} must be 0 or more, queue_size {queue_size} must be 1 or more")
 
 
 def of_required(values: Sequence[int], required: Sequence[bool]) -> tuple[int, ...]:

@@ -149,6 +149,13 @@ WITH_OPTIONAL = {**EXACT, "topics": [{"topic": "/a", "type": IMAGE, **OPTIONAL},
 BUNDLE = {"topic": "/set", "type": "dock_msgs/msg/Stereo"}
 BY_B = {**LATEST, "trigger": "/b", "max_age": "1s"}
 
+
+def _of_three(first: dict[str, Any]) -> str:
+    """A file whose group needs two of three inputs, of which the first has these keys."""
+    rows = [{"topic": topic, "type": IMAGE} for topic in ("/a", "/b", "/c")]
+    return file({**EXACT, "max_wait": "10ms", "quorum": 2, "topics": [{**rows[0], **first}, *rows[1:]]})
+
+
 OPTIONS: dict[str, Row] = {
     "policy": (file(), file(EXACT), NEAR_PAIRS),
     "queue_size": of_group(ONE_INPUT_AHEAD, EXACT, queue_size=(1, 2)),
@@ -159,6 +166,12 @@ OPTIONS: dict[str, Row] = {
     "restamp: input": of_group(NEAR_PAIRS, restamp=("/a", "/b")),
     "required": of_topic(sets_of((1, 10), (0, 20)), {**EXACT, "max_wait": 1}, **OPTIONAL),
     "max_wait": of_group(sets_after(50, (1, 100)), WITH_OPTIONAL, max_wait=("10ms", "1s")),
+    "quorum": of_group(sets_after(50, (0, 100)), {**EXACT, "max_wait": "10ms"}, quorum=1),
+    "required: with a quorum": (
+        _of_three({}),
+        _of_three({"required": True}),
+        sets_after(50, (1, 100), (2, 100)),
+    ),
     "max_wait: all required": of_group(OPEN_PAIR, max_wait="10ms"),
     "max_rate": of_group(EXACT_PAIRS, EXACT, max_rate="10 Hz"),
     "every": of_group(EXACT_PAIRS, EXACT, every=2),

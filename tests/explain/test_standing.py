@@ -160,7 +160,7 @@ def test_recovered_is_said_once_the_share_is_back(hz):
 
 def test_a_share_is_measured_by_one_clock_alone():
     """A simulated clock that rests is not asked: the system's is 54 years ahead of it."""
-    window = ShareWindow([0], counted=[0], ticks_hz=4.0)
+    window = ShareWindow(lambda _: [0], trigger=None, ticks_hz=4.0)
     for second in range(20):
         counts = [InputCounts(second * 4, second * 4, {}, 0)]
         clock = None if second == 10 else (100 + second) * S

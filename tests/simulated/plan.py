@@ -46,7 +46,14 @@ class Group:
 
     @property
     def optional(self) -> frozenset[str]:
+        if self.quorum:
+            return frozenset(self.topics)
         return frozenset(topic for topic, keys in self.inputs.items() if keys.get("required") is False)
+
+    @property
+    def quorum(self) -> int:
+        """How many inputs a set needs, whichever they are; 0 where it is those that are required."""
+        return int(self.options.get("quorum", 0))
 
     @property
     def repeats(self) -> bool:
@@ -173,6 +180,8 @@ def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
     transforms = not by_key and Random(f"transforms {seed}").random() < 0.25
     if transforms:
         groups = tuple(replace(each, options={**each.options, "transforms": TRANSFORMS}) for each in groups)
+    # By chances of their own: worlds without such a group stay as they were.
+    groups = tuple(_with_quorum(Random(f"quorum {seed} {each.name}"), each, sensors) for each in groups)
     used = {topic for group in groups for topic in group.topics}
     sensors = tuple(each for each in sensors if each.topic in used)
     node: dict[str, Any] = {}
@@ -238,6 +247,16 @@ def _group(chance: Random, name: str, sensors: Sequence[Sensor], *, exact: bool,
     if chance.random() < 0.2:
         options["manifest"] = False
     return Group(name, tuple(each.topic for each in chosen), options, inputs)
+
+
+def _with_quorum(chance: Random, group: Group, sensors: Sequence[Sensor]) -> Group:
+    """Have some groups of three or more be content with any so many."""
+    is_even = all(each.every == 1 for each in sensors if each.topic in group.topics)
+    can_be = group.options["policy"] in ("approximate_time", "exact_time") and len(group.topics) > 2 and is_even
+    if not can_be or chance.random() < 0.3:
+        return group
+    options = {**group.options, "quorum": chance.randrange(1, len(group.topics)), "max_wait": "300ms"}
+    return replace(group, options=options, inputs={})
 
 
 def _options(policy: str, first: str, hz: float) -> dict[str, Any]:

@@ -81,6 +81,8 @@ _AT_FIRST: Final = frozenset(
 )
 # Ticks come late, or all at once.
 _TICKS_LATE: Final = frozenset({"stall", "clock_set", "clock_stops", "clock_loops", "loops", "refuse_messages"})
+# One sensor sends nothing, or less.
+_ONE_IS_AWAY: Final = frozenset({"silent", "leaves", "dies", "halves", "restarts", "returns_silent"})
 _BUGS: Final = ("a bug in syncrelay", "Traceback")
 
 
@@ -319,6 +321,8 @@ class Promises:
             lacks = [topic for topic, number in rows if number is None and topic not in group.optional]
             if lacks and not group.by_clock:
                 yield f"{where} lacks {lacks}"
+            if sum(number is not None for number in one.numbers) < group.quorum:
+                yield f"{where} has fewer than {group.quorum} messages"
             if group.repeats:
                 continue
             if len({number / plan.sensor(topic).every for topic, number in rows if number is not None}) > 1:
@@ -354,6 +358,9 @@ class Promises:
         """Return the times in which sets of a group may be missing."""
         plan = self.world.plan
         spoiling = [step for step in plan.steps if KINDS[step.kind].spoils and concerns(step.kind, step.target, group)]
+        if group.quorum and not _overlap(spoiling):
+            # There is always one more than a set needs.
+            spoiling = [step for step in spoiling if step.kind not in _ONE_IS_AWAY]
         # The first trigger after a jump has nothing that is older.
         at_least = 2.0 if group.repeats else 0.0
         times = []
@@ -367,6 +374,9 @@ class Promises:
 
     def _moments(self, group: Group) -> Iterator[_Moment]:
         """Yield the moments of which all required inputs were sent, by the number of the first of them."""
+        if group.quorum:
+            yield from self._moments_of_any(group)
+            return
         plan = self.world.plan
         triggers = group.topics[:1] if group.repeats else group.required
         anchor = triggers[0]
@@ -379,6 +389,15 @@ class Promises:
             came = [each for each in others if each is not None]
             if len(came) == len(others):
                 yield _Moment(anchor, number, at, max(came), sets.get(number))
+
+    def _moments_of_any(self, group: Group) -> Iterator[_Moment]:
+        """Yield those of which enough inputs were sent."""
+        sets = {number: each.at for each in self.sets[group.name] for number in each.numbers if number is not None}
+        for number in sorted({number for topic in group.topics for number in self._written[topic]}):
+            came = sorted((at, topic) for topic in group.topics if (at := self._written[topic].get(number)) is not None)
+            if len(came) >= group.quorum:
+                at, topic = came[0]
+                yield _Moment(topic, number, at, came[group.quorum - 1][0], sets.get(number))
 
     def _missing_sets(self, group: Group) -> Iterator[str]:
         """Yield the moments of which no set left though all was well, and the sets that took too long."""

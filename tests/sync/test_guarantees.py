@@ -124,6 +124,7 @@ def test_a_set_has_all_required_inputs_and_fits(policy, rig):
             index for index, message in enumerate(match.messages) if message is not None
         ]
         assert all(match.messages[index] for index, needed in enumerate(chosen.required) if needed)
+        assert len(members(match)) >= (chosen.quorum or 0)
         stamps = shifted(match, chosen)
         if policy == "equal_key":
             assert len({message.key for message in members(match)}) == 1
@@ -190,6 +191,7 @@ def test_what_is_buffered_is_bounded(policy, rig):
 def test_optional_inputs_never_change_which_required_messages_go_together(policy, rig):
     chosen, taken = rig
     assume(not all(chosen.required))
+    chosen = replace(chosen, quorum=None)
     mixed = sets_of(flat(run(make_group(policy, chosen), taken)))
     alone = replace(
         chosen,

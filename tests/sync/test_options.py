@@ -16,7 +16,7 @@ from syncrelay.sync import (
 )
 from tests.sync.support.rigs import EXPORTED
 
-SIZES: list[dict[str, Any]] = [{"n_inputs": 0}, {"queue_size": 0}]
+SIZES: list[dict[str, Any]] = [{"n_inputs": -1}, {"queue_size": 0}]
 OF_LATEST: list[dict[str, Any]] = [{"required": (True,)}, {"max_ages_ns": (None, -1)}, {"max_ages_ns": (None,)}]
 RIGHT: dict[Any, dict[str, Any]] = {
     ExactTime: {},

@@ -9,7 +9,7 @@ from syncrelay.sync import DropReason, Match, Message, Restamp
 from tests.faults.extent import chosen
 from tests.sync.support.reference_group import ByKey, ByStamp, ReferenceGroup
 from tests.sync.support.references import ReferenceAtTicks
-from tests.sync.support.rigs import BY_CLOCK, POLICIES, START, TICK, Options, Tally, make_group, make_policy
+from tests.sync.support.rigs import BY_CLOCK, OF_ANY, POLICIES, START, TICK, Options, Tally, make_group, make_policy
 
 GROUPS = chosen(short=200, long=2_000)
 LAGS = (0,) * 8 + (1, 1, 2, 3, 5, 8, 13, 99, 100, 101, 102, 250)
@@ -19,10 +19,14 @@ FALLS = (0,) * 40 + (1, 30)
 def drawn(rng, policy):
     n_inputs = rng.choice((1, 2, 2, 3, 3, 4))
     required = [rng.random() < 0.6 for _ in range(n_inputs)]
-    required[rng.randrange(n_inputs)] = True
+    if policy not in OF_ANY or rng.random() < 0.6:
+        required[rng.randrange(n_inputs)] = True
+    quorum = rng.randint(max(1, sum(required)), n_inputs)
+    quorum = rng.choice((quorum, sum(required) or quorum))
     may_wait_forever = all(required) or policy in ("latest_time", *BY_CLOCK)
     return Options(
         required=tuple(required),
+        quorum=quorum,
         queue_size=rng.choice((1, 2, 3, 9)),
         slop=rng.randrange(6),
         age_penalty=rng.choice((0.0, 0.1, 2.0)),
@@ -51,8 +55,9 @@ def reference(policy, options):
 
     made = make_policy(policy, options)
     return ReferenceGroup(
-        ReferenceAtTicks(made, options, options.required) if policy in BY_CLOCK else made,
+        ReferenceAtTicks(made, options, options.required, options.quorum) if policy in BY_CLOCK else made,
         required=options.required,
+        quorum=options.quorum,
         max_wait_ns=None if options.max_wait is None else options.max_wait * TICK,
         offsets_ns=[offset * TICK for offset in options.offsets],
         restamp=options.restamp,

@@ -58,6 +58,7 @@ def latest_time(rng, sizes):
         "trigger": rng.randrange(sizes["n_inputs"]),
         "max_ages_ns": [rng.choice((None, 0, 20 * MS, 200 * MS)) for _ in range(sizes["n_inputs"])],
         "required": required,
+        "quorum": rng.randint(0, sizes["n_inputs"]),
     }
     required[options["trigger"]] = True
     return LatestTime(**sizes, **options), ReferenceLatest(**sizes, **options)

@@ -35,8 +35,9 @@ def why_few_sets(
     ones. The recording is read again only where sets are few.
     """
     group = binding.group
-    among = [index for index, topic in enumerate(group.topics) if topic.required or index in needed]
-    possible = _possible(recording, group, [each.fed for each in counts], among)
+    fed = [each.fed for each in counts]
+    among = sorted({*group.enough(fed), *needed})
+    possible = _possible(recording, group, fed, among)
     if possible < _FEWEST or 2 * complete >= possible:
         return None
     few = f"{group.name}: only {complete} of {counted(possible, 'possible set')} are complete"

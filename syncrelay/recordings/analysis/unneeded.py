@@ -85,13 +85,14 @@ def find_unneeded(group: GroupConfig, evaluation: Evaluation, reach: int | None)
     lacking: list[tuple[int, ...]] = [() for _ in group.topics]
     if reach is None:
         return Unneeded(flags, tuple(lacking))
+    needed = group.enough([counts.fed for counts in evaluation.counts])
     for index in range(len(group.topics)):
         places = np.array(
             [at for at, drop in enumerate(drops) if drop.input == index and drop.reason in FOR_WANT_OF_A_PARTNER],
             dtype=np.int64,
         )
         stamps = _stamps(group, index, [drops[at].stamp for at in places.tolist()])
-        others = [each for each, topic in enumerate(group.topics) if topic.required and each != index]
+        others = [each for each in needed if each != index]
         lacks = {each: ~_has_near(stamps, _left_over(group, evaluation, each, index), reach) for each in others}
         if not lacks:
             continue

@@ -34,8 +34,9 @@ class GroupBinding:
 
     @property
     def is_complete(self) -> bool:
-        """Whether every required input has a channel, so that sets are possible."""
-        return all(each.channels for each in self.inputs if each.config.required)
+        """Whether every required input, and enough of the others, have a channel, so that sets are possible."""
+        have = [len(each.channels) for each in self.inputs]
+        return all(have[index] for index in self.group.enough(have))
 
 
 def bind(config: Config, recording: Recording) -> tuple[GroupBinding, ...]:

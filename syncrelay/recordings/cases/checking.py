@@ -229,8 +229,8 @@ def _of_bound(bound: Bound, found: Decimal | None, path: Path) -> Iterator[Misma
 
 def _figures(group: GroupConfig, evaluation: Evaluation) -> _Figures:
     counts = evaluation.counts
-    required = [index for index, topic in enumerate(group.topics) if topic.required]
-    rarest = min(required, key=lambda index: counts[index].fed) if group.trigger is None else group.trigger
+    fed = [each.fed for each in counts]
+    rarest = min(group.enough(fed), key=fed.__getitem__) if group.trigger is None else group.trigger
     spans = Distribution([each.span for each in evaluation.sets])
     latencies = Distribution([each.latency for each in evaluation.sets])
     return {

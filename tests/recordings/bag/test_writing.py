@@ -116,7 +116,7 @@ def test_a_manifest_is_written_behind_the_messages_of_its_set(tmp_path):
 def test_sets_of_a_clock_have_the_stamps_of_its_ticks(tmp_path):
     wait, bag = 60_000_000, write_mcap(tmp_path / "rig.mcap", rig(40))
     by_clock = {"policy": "latest_time", "slop": None, "trigger": "29.97 Hz", "max_wait": "60ms", "restamp": "trigger"}
-    written = _written(bag, tmp_path / "out", **by_clock)
+    written = write(bag, tmp_path / "out", **by_clock)
     assert [stamp_of(frame.payload) for frame in written] == [frame.time - wait for frame in written]
     assert len(written) > 200
 

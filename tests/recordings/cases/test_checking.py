@@ -1,5 +1,7 @@
 """What comes of drawn, simulated and recorded messages is what the engine and the judge make of them."""
 
+from typing import Any
+
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
@@ -26,7 +28,7 @@ def test_a_set_is_told_with_the_stamp_that_it_is_given(tmp_path):
 
 
 def test_a_set_of_a_tick_is_told_with_the_stamp_of_the_tick(tmp_path):
-    by_clock = {"policy": "latest_time", "slop": None, "trigger": "20 Hz", "restamp": "trigger"}
+    by_clock: dict[str, Any] = {"policy": "latest_time", "slop": None, "trigger": "20 Hz", "restamp": "trigger"}
     assert left(tmp_path, "camera |.a.......\nlidar  |..A......\n", **by_clock) == ("@5: aA stamped tick",)
 
 

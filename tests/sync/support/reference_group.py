@@ -6,18 +6,20 @@ from typing import Any
 from syncrelay.sync import Drop, DropReason, Match, Message, Outcome, Restamp
 
 SECOND = 10**9
+START_OF_TIME = 2**63
 
 
 class ReferenceGroup:
     """A policy of the required inputs, with everything else that a group does done here, on plain lists."""
 
-    def __init__(self, policy, *, required, max_wait_ns, offsets_ns, restamp, every, min_set_period_ns, stage):
+    def __init__(self, policy, *, required, quorum, max_wait_ns, offsets_ns, restamp, every, min_set_period_ns, stage):
         self.inputs = range(policy.n_inputs)
-        self.policy, own = policy.for_required(required)
+        self.policy, own = policy.for_required(required, quorum)
         self.by_clock, self.by_stamp, self.repeats = policy.by_clock, policy.by_stamp, policy.repeats
         self.required = [index for index in self.inputs if required[index]]
         self.optional = list(own.inputs)
         self.stage = stage(self.optional)
+        self.stage.quorum = quorum
         self.max_wait, self.restamp = max_wait_ns, restamp
         self.offsets = offsets_ns or [0] * policy.n_inputs
         self.every, self.period = every, min_set_period_ns
@@ -56,6 +58,7 @@ class ReferenceGroup:
         if self.newest[index] is not None and stamp < self.newest[index] - SECOND:
             old = [self.newest[other] if self.before[other] is None else self.before[other] for other in self.inputs]
             left = self.empty(DropReason.TIME_JUMP)
+            self.stage.last = None
             self.begin()
             self.jumped, self.before = index, old
             self.before[index] = None
@@ -67,7 +70,7 @@ class ReferenceGroup:
 
     def feed(self, message):
         if message.input in self.optional:
-            left = self.stage.put(message, self.by(message))
+            left = self.stage.put(message, self.by(message), self.now)
         else:
             place = [index for index in self.inputs if index not in self.optional].index(message.input)
             left = self.join(self.policy.feed(place, self.by(message), message))
@@ -96,7 +99,7 @@ class ReferenceGroup:
         if self.by_clock:
             tick = self.policy.next_tick()
             return None if tick is None else tick + (self.max_wait or 0)
-        since = [each["since"] for each in self.stage.waiting] or self.waits
+        since = sorted(map(self.stage.since, self.stage.sets())) or self.waits
         return since[0] + self.max_wait if since and self.max_wait is not None else None
 
     def due(self):
@@ -104,13 +107,14 @@ class ReferenceGroup:
         if self.by_clock:
             return list(self.policy.advance(self.now - (self.max_wait or 0)))
         while (deadline := self.next_deadline()) is not None and deadline <= self.now:
-            left += self.stage.leave() if self.stage.waiting else self.join(self.policy.release_oldest())
+            left += self.stage.leave() if self.stage.sets() else self.join(self.policy.release_oldest())
         return left
 
     def expire(self, *, now):
         self.waits = [min(since, now) for since in self.waits]
         for each in self.stage.waiting:
             each["since"] = min(each["since"], now)
+        self.stage.came = {which: min(came, now) for which, came in self.stage.came.items()}
         self.now = now
         return self.leave(self.due(), now)
 
@@ -130,6 +134,7 @@ class ReferenceGroup:
 
     def flush(self, reason):
         drops = self.empty(reason)
+        self.stage.last = None
         self.begin()
         return drops
 
@@ -151,6 +156,8 @@ class ReferenceGroup:
     def thin(self, match, now):
         members = list(filter(None, match.messages))
         stamps = [self.by(each) for each in members if each.input in self.required and each.stamp]
+        if not self.required:
+            stamps = [self.by(members[0])]
         passes = self.passes(match.tick if match.tick is not None else max(stamps, default=now))
         if not self.repeats:
             return [self.stamped(match)] if passes else [Drop(each, DropReason.THINNED) for each in members]
@@ -198,21 +205,39 @@ class Stage:
     is_decided: Any
     """Whether nothing that may still come is better than the best."""
 
+    quorum: int
+
     def __init__(self, optional, n_inputs, queue_size):
         self.optional, self.n_inputs, self.queue_size = optional, n_inputs, queue_size
         self.waiting: list[dict] = []
         self.queued: list[tuple[int, Message]] = []
         self.shown: dict[int, int] = {}
+        self.came: dict[tuple, int] = {}
+        self.last: tuple | None = None
+
+    @property
+    def is_any(self):
+        """Whether no input is required."""
+        return len(self.optional) == self.n_inputs
 
     def of(self, index):
         """The stamps that an input's messages are matched by, and these."""
         return [each for each in self.queued if each[1].input == index]
 
-    def put(self, message, stamp):
+    def which(self, each):
+        """What tells a message from all others that are queued."""
+        stamp, message = each
+        return message.input, message.key if isinstance(self, ByKey) else stamp
+
+    def put(self, message, stamp, now):
+        if self.last is not None and stamp <= self.last[0]:
+            return [Drop(message, DropReason.LATE)]
         same = [each for each in self.of(message.input) if self.is_same(each, (stamp, message))]
         self.queued = [each for each in self.queued if each not in same] + [(stamp, message)]
+        self.came = {which: came for which, came in self.came.items() if which in map(self.which, self.queued)}
+        self.came.setdefault(self.which((stamp, message)), now)
         self.shown[message.input] = max(stamp, self.shown.get(message.input, stamp))
-        left = [Drop(each, DropReason.DUPLICATE) for _, each in same] + self.leave_decided()
+        left = [Drop(each, DropReason.DUPLICATE) for _, each in same] + self.leave_decided() + self.drop_alone()
         if len(self.of(message.input)) > self.queue_size:
             left.append(self.drop(self.in_order(self.of(message.input))[0], DropReason.OVERFLOW))
         return left
@@ -225,25 +250,62 @@ class Stage:
         left = self.leave_decided()
         return left + self.leave() if len(self.waiting) > self.queue_size else left
 
+    def all(self):
+        """What sets may be made round, the oldest first, each with what the next one is made round."""
+        return [{**one, "next": other} for one, other in zip(self.waiting, [*self.waiting[1:], None], strict=False)]
+
+    def sets(self):
+        """Those that have enough messages."""
+        return [each for each in self.all() if self.since(each) is not None]
+
+    def taken(self, seed):
+        """The messages that a set takes of the optional inputs."""
+        stamps, taken = list(seed["stamps"]), {}
+        for index in self.optional:
+            best = self.best(index, seed, stamps)
+            if best is not None:
+                taken[index] = best
+                stamps.append(best[0])
+        return taken
+
+    def since(self, seed):
+        there = [seed["since"] for message in seed["messages"] if message is not None]
+        there += sorted(self.came[self.which(each)] for each in self.taken(seed).values())
+        return max([seed["since"], *there[: self.quorum]]) if len(there) >= self.quorum else None
+
     def leave_decided(self):
         left: list[Outcome] = []
-        while self.waiting and all(self.is_decided(index) for index in self.optional):
-            left += self.leave()
+        while (seeds := self.all()) and all(self.is_decided(index, seeds[0]) for index in self.optional):
+            left += self.leave() if seeds[0] in self.sets() else self.give_up(DropReason.TOO_FAR)
         return left
 
+    def give_up(self, reason):
+        return [Drop(message, reason) for message in self.waiting.pop(0)["messages"] if message is not None]
+
     def leave(self):
-        waiting, drops = self.waiting[0], []
-        messages, stamps = list(waiting["messages"]), list(waiting["stamps"])
+        if not self.sets():
+            return self.give_up(DropReason.OVERFLOW)
+        seed = self.sets()[0]
+        drops = []
+        while self.waiting and self.all()[0] != seed:
+            drops += self.give_up(DropReason.SUPERSEDED)
+        messages, taken = list(seed["messages"]), self.taken(seed)
         for index in self.optional:
-            best = self.best(index, stamps)
+            best = taken.get(index)
             reason = DropReason.TOO_FAR if best is None else DropReason.SUPERSEDED
-            drops += [self.drop(each, reason) for each in self.useless(index, best)]
+            drops += [self.drop(each, reason) for each in self.useless(index, seed, best)]
             if best is not None:
                 self.queued.remove(best)
-                stamps.append(best[0])
                 messages[index] = best[1]
-        del self.waiting[0]
+        if self.is_any:
+            members = {index: stamp for index, (stamp, _) in taken.items()}
+            self.last = seed["stamps"][0], members
+        else:
+            del self.waiting[0]
         return [*drops, Match(tuple(messages))]
+
+    def drop_alone(self):
+        return []
 
     def drop(self, each, reason):
         self.queued.remove(each)
@@ -252,7 +314,7 @@ class Stage:
     def empty(self, reason):
         held = [message for waiting in self.waiting for message in waiting["messages"] if message is not None]
         drops = [Drop(message, reason) for message in held + [message for _, message in self.queued]]
-        self.waiting, self.queued, self.shown = [], [], {}
+        self.waiting, self.queued, self.shown, self.came = [], [], {}, {}
         return drops
 
 
@@ -269,35 +331,84 @@ class ByStamp(Stage):
     def in_order(self, queued):
         return sorted(queued, key=lambda each: each[0])
 
-    def middles(self):
-        """Twice the middle of the oldest set, and of the next."""
-        return [min(each["stamps"]) + max(each["stamps"]) for each in self.waiting[:2]]
+    def all(self):
+        return self.around_any() if self.is_any else super().all()
 
-    def fits(self, stamp, stamps):
-        oldest, *following = self.middles()
+    def around_any(self):
+        """Wherever messages of enough inputs are near the oldest of them: round the first input's that is near."""
+        rest, seeds = self.in_order(self.queued), []
+        while rest:
+            oldest = rest[0][0]
+            near = {message.input for stamp, message in rest if stamp <= oldest + self.slop}
+            if len(near) < self.quorum:
+                del rest[0]
+                continue
+            first = [next((each for each in rest if each[1].input == index), None) for index in self.optional]
+            seed = rest[0]
+            for each in reversed(first[: seed[1].input]):
+                if each is not None and each[0] <= seed[0] + self.slop:
+                    seed = each
+            rest.remove(seed)
+            following = [stamp for stamp, message in rest if message.input == seed[1].input]
+            around = {"messages": [None] * self.n_inputs, "stamps": [seed[0]], "since": -START_OF_TIME}
+            made = {**around, "next": {"stamps": following[:1]} if following else None}
+            seeds += [made] if self.since(made) is not None and not self.was_left_out(made) else []
+        return seeds
+
+    def was_left_out(self, made):
+        """Whether it is made only of what the last set would have taken, had it come in time."""
+        if self.last is None:
+            return False
+        _, members = self.last
+        return all(
+            index not in members and stamp - min(members.values()) <= self.slop
+            for index, (stamp, _) in self.taken(made).items()
+        )
+
+    def drop_alone(self):
+        left: list[Outcome] = []
+        while self.is_any and self.queued:
+            oldest = self.in_order(self.queued)[0]
+            last = oldest[0] + self.slop
+            may_be_near = [
+                index
+                for index in self.optional
+                if index not in self.shown
+                or self.shown[index] + max(1, self.steps[index]) <= last
+                or any(stamp <= last for stamp, _ in self.of(index))
+            ]
+            if len(may_be_near) >= self.quorum:
+                break
+            left.append(self.drop(oldest, DropReason.TOO_FAR))
+        return left
+
+    def middle(self, seed):
+        """Twice the middle."""
+        return min(seed["stamps"]) + max(seed["stamps"])
+
+    def fits(self, stamp, seed, stamps):
         near = max([*stamps, stamp]) - min([*stamps, stamp]) <= self.slop
-        return near and all(2 * stamp - oldest <= other - 2 * stamp for other in following)
+        following = seed["next"]
+        return near and (following is None or 2 * stamp - self.middle(seed) <= self.middle(following) - 2 * stamp)
 
-    def best(self, index, stamps):
-        fitting = [each for each in self.of(index) if self.fits(each[0], stamps)]
-        return min(fitting, key=lambda each: (abs(2 * each[0] - self.middles()[0]), each[0]), default=None)
+    def best(self, index, seed, stamps):
+        fitting = [each for each in self.of(index) if self.fits(each[0], seed, stamps)]
+        return min(fitting, key=lambda each: (abs(2 * each[0] - self.middle(seed)), each[0]), default=None)
 
-    def useless(self, index, best):
-        last = max(self.waiting[0]["stamps"]) - self.slop + 1 if best is None else best[0]
+    def useless(self, index, seed, best):
+        last = max(seed["stamps"]) - (0 if self.is_any else self.slop) + 1 if best is None else best[0]
         return [each for each in self.in_order(self.of(index)) if each[0] < last]
 
-    def is_decided(self, index):
+    def is_decided(self, index, seed):
         """Whether a message of the least stamp that may come is farther from the middle than the best, or too far."""
         if index not in self.shown:
             return False
         soonest = self.shown[index] + max(1, self.steps[index])
-        best = self.best(index, self.waiting[0]["stamps"])
+        stamps, middle = seed["stamps"], self.middle(seed)
+        best = self.best(index, seed, stamps)
         if best is not None:
-            return abs(2 * soonest - self.middles()[0]) >= abs(2 * best[0] - self.middles()[0]) and (
-                2 * soonest >= self.middles()[0]
-            )
-        stamps = self.waiting[0]["stamps"]
-        return soonest > max(stamps) - self.slop and not self.fits(soonest, stamps)
+            return abs(2 * soonest - middle) >= abs(2 * best[0] - middle) and 2 * soonest >= middle
+        return soonest > max(stamps) - self.slop and not self.fits(soonest, seed, stamps)
 
 
 class ByKey(Stage):
@@ -309,15 +420,15 @@ class ByKey(Stage):
     def in_order(self, queued):
         return queued
 
-    def best(self, index, _):
-        return next((each for each in self.of(index) if each[1].key == self.waiting[0]["key"]), None)
+    def best(self, index, seed, _):
+        return next((each for each in self.of(index) if each[1].key == seed["key"]), None)
 
-    def useless(self, index, best):
+    def useless(self, index, _, best):
         queued = self.of(index)
         if best is None:
             return []
         place = queued.index(best)
         return [each for number, each in enumerate(queued) if number < place or each[1].stamp < best[1].stamp]
 
-    def is_decided(self, index):
+    def is_decided(self, index, _):
         return any(each[1].key == waiting["key"] for each in self.of(index) for waiting in self.waiting)

@@ -1,6 +1,7 @@
 """Each policy slow and obvious: plain lists, no bookkeeping. What is fed must leave as from the engine."""
 
 from itertools import product
+from operator import ge
 from types import SimpleNamespace
 
 from syncrelay.sync import Drop, DropReason, Match, Message, Outcome
@@ -140,11 +141,11 @@ class ReferenceEpsilon(Queued):
 
 
 class ReferenceLatest(Queued):
-    def __init__(self, n_inputs, queue_size, trigger, max_ages_ns, required):
+    def __init__(self, n_inputs, queue_size, *, trigger, max_ages_ns, required, quorum=0):
         super().__init__(n_inputs, queue_size)
         self.trigger = trigger
         self.max_ages = [float("inf") if age is None else age for age in max_ages_ns]
-        self.required = required
+        self.required, self.quorum = required, quorum
         self.served = []
 
     def take(self, message):
@@ -162,9 +163,13 @@ class ReferenceLatest(Queued):
 
     def serve(self, trigger):
         found = [self.find(index, trigger) for index in range(self.n_inputs)]
-        if "wait" in found and "never" not in found:
-            return False
-        if "never" in found:
+        may_come = [
+            message is not None or all(queued.stamp <= trigger.stamp for queued in self.of(index))
+            for index, message in enumerate(found)
+        ]
+        if not self.are_enough([message is not None for message in found]):
+            if self.are_enough(may_come):
+                return False
             self.drop(trigger, DropReason.TOO_FAR)
         else:
             for index, member in enumerate(found):
@@ -183,11 +188,11 @@ class ReferenceLatest(Queued):
 
     def find(self, index, trigger):
         fits = [queued for queued in self.of(index) if 0 <= trigger.stamp - queued.stamp <= self.max_ages[index]]
-        if fits:
-            return fits[-1]
-        if not self.required[index]:
-            return None
-        return "never" if any(queued.stamp > trigger.stamp for queued in self.of(index)) else "wait"
+        return fits[-1] if fits else None
+
+    def are_enough(self, there):
+        are_required_there = all(is_there for is_there, needed in zip(there, self.required, strict=True) if needed)
+        return are_required_there and sum(there) >= self.quorum
 
     def forget(self, message, reason):
         if message in self.served:
@@ -229,15 +234,15 @@ class ReferenceAtTicks:
 
     by_clock = by_stamp = repeats = True
 
-    def __init__(self, policy, options, required):
-        self.n_inputs, self.options, self.required = policy.n_inputs, options, required
+    def __init__(self, policy, options, required, quorum=0):
+        self.n_inputs, self.options, self.required, self.quorum = policy.n_inputs, options, required, quorum
         self.ticks, self.policy = policy.ticks, policy
         self.queues: list[list[tuple[int, Message]]] = [[] for _ in range(self.n_inputs)]
         self.served: list[Message] = []
         self.passed, self.until, self.fed_until = -1, 0, -REST_NS
 
-    def for_required(self, required):
-        return ReferenceAtTicks(self.policy, self.options, required), SimpleNamespace(inputs=())
+    def for_required(self, required, quorum):
+        return ReferenceAtTicks(self.policy, self.options, required, quorum), SimpleNamespace(inputs=())
 
     def feed(self, place, stamp, message):
         self.fed_until = self.until
@@ -279,7 +284,8 @@ class ReferenceAtTicks:
         return None
 
     def has_required(self, taken):
-        return all(message is not None for message, needed in zip(taken, self.required, strict=True) if needed)
+        there = [message is not None for message in taken]
+        return all(map(ge, there, self.required)) and sum(there) >= self.quorum
 
     def advance(self, until):
         self.begin_again_if_fallen(until)

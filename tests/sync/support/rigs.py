@@ -26,6 +26,7 @@ class Options:
     """A group, but for its policy's name; times in ticks."""
 
     required: tuple
+    quorum: int | None = None
     queue_size: int = 3
     slop: int = 2
     age_penalty: float = 0.1
@@ -64,6 +65,8 @@ EXPORTED = {
     if isinstance(each, type) and hasattr(each, "by_stamp") and each is not sync.Policy
 }
 """The engines of all policies that the library has."""
+# Sets can be made round a message of any input.
+OF_ANY = ["exact_time", "approximate_time", *BY_CLOCK]
 ONCE = [name for name, model in POLICIES.items() if not model.repeats]
 
 
@@ -102,6 +105,7 @@ def make_group(name, options):
     return SyncGroup(
         make_policy(name, options),
         required=options.required,
+        quorum=options.quorum,
         max_wait_ns=None if options.max_wait is None else options.max_wait * TICK,
         offsets_ns=[offset * TICK for offset in options.offsets] or None,
         restamp=options.restamp,
@@ -133,6 +137,7 @@ def options(draw, *, optional=True, limited=True, thinned=True, offset=False):
     shifts = st.tuples(*[few(-5, 5)] * n_inputs)
     return Options(
         required=required,
+        quorum=draw(st.none() | few(sum(required), n_inputs)),
         queue_size=draw(few(1, 5)),
         slop=draw(few(0, 5)),
         age_penalty=draw(st.sampled_from((0.0, 0.1, 0.7, 2.0))),

@@ -1,0 +1,95 @@
+"""Groups with a quorum: what is said while somebody is missing, and how the group stands."""
+
+from functools import partial
+
+import pytest
+
+from syncrelay.explain.codes import Severity
+from syncrelay.explain.standing import Standing
+from tests.explain.scenario import Source, run
+
+OPTIONS = {"quorum": 2, "slop": "20ms", "max_wait": "60ms"}
+NAMES = ("/top", "/left", "/right")
+
+
+def _is_there(begin, end, second):
+    return not begin <= second < end
+
+
+def lidars(away, **faults):
+    """Three lidars of 10 Hz, each away between two seconds if it is among those that are."""
+    for place, name in enumerate(NAMES):
+        begin, end = away.get(name, (0, 0))
+        yield Source(
+            name,
+            10,
+            phase_ms=place,
+            topic_options={"min_period": "70ms"},
+            jitter_ms=1,
+            delay_jitter_ms=1,
+            sends=partial(_is_there, begin, end),
+            **faults.get(name, {}),
+        )
+
+
+def severities(told, since, until):
+    return {each.severity for second, found in told.found if since <= second < until for each in found}
+
+
+@pytest.mark.parametrize("dead", NAMES)
+def test_a_group_without_one_of_three_stands_well_and_says_who_is_missing_for_good(dead):
+    told = run(*lidars({dead: (20, 120)}), seconds=140, options=OPTIONS)
+    assert {finding for _, found in told.found for finding in found if finding.severity is Severity.ERROR} == set()
+    assert told.codes == {"silent"}
+    assert told.first.topics == {dead}
+    # A minute later too: one more, and no set leaves.
+    last = next(found for second, found in told.found if second == 115)
+    assert [(each.code.value, each.severity) for each in last] == [("silent", Severity.WARN)]
+    assert told.facts.standing is Standing.ENOUGH
+    assert severities(told, 130, 140) == set()
+
+
+def test_one_of_which_the_file_says_that_it_is_optional_is_no_news_after_a_minute():
+    sources = list(lidars({"/right": (20, 999)}))
+    sources[2] = Source("/right", 10, required=False, sends=lambda second: second < 20)
+    told = run(*sources, seconds=100, options=OPTIONS)
+    assert severities(told, 90, 100) == {Severity.OK}
+
+
+@pytest.mark.parametrize("alive", NAMES)
+def test_a_group_without_two_of_three_is_silent_because_of_both(alive):
+    dead = {name: (20, 40) for name in NAMES if name != alive}
+    told = run(*lidars(dead), seconds=70, options=OPTIONS)
+    at_worst = next(found for second, found in told.found if second == 35)
+    assert {(each.code.value, each.severity) for each in at_worst} == {("silent", Severity.ERROR)}
+    assert {NAMES[index] for each in at_worst for index in each.about} == set(dead)
+    assert severities(told, 60, 70) == set()
+
+
+def test_one_after_the_other_may_be_away_and_the_group_stands_well():
+    told = run(*lidars({"/top": (20, 40), "/left": (40, 60), "/right": (60, 80)}), seconds=100, options=OPTIONS)
+    assert {finding for _, found in told.found for finding in found if finding.severity is Severity.ERROR} == set()
+    assert told.codes == {"silent"}
+
+
+def test_one_that_never_came_is_said_and_costs_nothing():
+    told = run(*lidars({"/left": (0, 99)}), seconds=40, options=OPTIONS)
+    assert told.codes == {"silent"}
+    assert told.facts.standing is Standing.ENOUGH
+
+
+def test_one_whose_clock_is_off_is_told_by_how_much():
+    off = {"/top": {"clock": lambda _: 0.05}}
+    told = run(*lidars({}, **off), seconds=40, options=OPTIONS)
+    (finding,) = [each for each in told.found[-1][1] if each.severity is not Severity.OK]
+    assert finding.code.value == "waiting_for_optional"
+    assert finding.input == 0
+    assert "the nearest sets with it span 4" in finding.text
+    assert told.facts.standing is Standing.ENOUGH
+
+
+def test_where_none_are_near_enough_it_is_the_slop():
+    apart = {name: {"clock": lambda _, place=place: place * 0.03} for place, name in enumerate(NAMES)}
+    told = run(*lidars({}, **apart), seconds=40, options=OPTIONS)
+    assert told.codes == {"over_slop"}
+    assert told.facts.standing is Standing.NONE

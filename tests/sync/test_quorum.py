@@ -1,0 +1,200 @@
+"""Sets of any inputs, as users of Autoware's concatenation expect: lidars that die, return, come late or are lost."""
+
+import random
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import pytest
+
+from syncrelay.sync import ApproximateTime, DropReason, EqualKey, ExactTime, Match, Message, Restamp, SyncGroup
+from tests.faults.extent import chosen
+from tests.sync.support.rigs import Tally
+
+MS = 10**6
+PERIOD, SLOP, MAX_WAIT, START = 100 * MS, 20 * MS, 60 * MS, 10**12
+WORLDS = chosen(short=60, long=1_000)
+
+
+def lidars(n_inputs=3, quorum=2, *, required=(), policy=None, **options):
+    made = policy or ApproximateTime(
+        n_inputs=n_inputs, queue_size=10, slop_ns=SLOP, min_periods_ns=[PERIOD * 7 // 10] * n_inputs
+    )
+    return SyncGroup(
+        made,
+        required=[index in required for index in range(n_inputs)],
+        quorum=quorum,
+        max_wait_ns=MAX_WAIT,
+        **options,
+    )
+
+
+@dataclass(frozen=True)
+class Scan:
+    """What one lidar sends of one turn: its payload is the number of the turn."""
+
+    input: int
+    turn: int
+    stamp: int
+    received: int
+
+
+def scans(away=(), *, turns=10, delay=5 * MS, lidars=3):
+    """Turns of lidars, one millisecond apart, without those that are `away`: (lidar, first turn, turn of return)."""
+    for turn in range(turns):
+        for index in range(lidars):
+            if not any(index == which and first <= turn < back for which, first, back in away):
+                stamp = START + turn * PERIOD + index * MS
+                yield Scan(index, turn, stamp, stamp + delay)
+
+
+def played(group, sent):
+    """The sets that leave and when, each deadline kept to the nanosecond."""
+    left = []
+    for scan in sorted(sent, key=lambda each: each.received):
+        while (deadline := group.next_deadline()) is not None and deadline < scan.received:
+            left += [(each, deadline) for each in group.expire(now=deadline)]
+        message = Message(scan.input, scan.stamp, scan.turn)
+        left += [(each, scan.received) for each in group.add(message, now=scan.received)]
+    while (deadline := group.next_deadline()) is not None:
+        left += [(each, deadline) for each in group.expire(now=deadline)]
+    return left
+
+
+def turns_of(left):
+    """Of each set: the turns of its messages, None where one is missing."""
+    return [
+        tuple(message and message.payload for message in each.messages) for each, _ in left if isinstance(each, Match)
+    ]
+
+
+@pytest.mark.parametrize("dead", range(3))
+def test_each_of_three_lidars_may_die_and_return(dead):
+    left = played(lidars(), scans([(dead, 3, 6)]))
+    expected = [tuple(None if index == dead and 3 <= turn < 6 else turn for index in range(3)) for turn in range(10)]
+    assert turns_of(left) == expected
+    for match, moment in left:
+        stamps = [message.stamp for message in match.messages if message is not None]
+        # A whole set leaves with its last message, another waits from its second.
+        assert moment == (max(stamps) if len(stamps) == 3 else sorted(stamps)[1] + MAX_WAIT) + 5 * MS
+
+
+@pytest.mark.parametrize("alive", range(3))
+def test_with_two_dead_no_set_of_two_leaves_and_sets_of_one_do(alive):
+    away = [(index, 3, 6) for index in range(3) if index != alive]
+    two = turns_of(played(lidars(quorum=2), scans(away)))
+    one = turns_of(played(lidars(quorum=1), scans(away)))
+    assert two == [(turn,) * 3 for turn in (0, 1, 2, 6, 7, 8, 9)]
+    assert one == [
+        tuple(turn if turn not in (3, 4, 5) or index == alive else None for index in range(3)) for turn in range(10)
+    ]
+
+
+def test_a_lidar_that_never_came_is_waited_for_and_not_needed():
+    assert turns_of(played(lidars(), scans([(0, 0, 99)]))) == [(None, turn, turn) for turn in range(10)]
+
+
+def test_the_cloud_that_comes_when_its_set_has_left_is_late_and_in_no_other():
+    sent = [replace(each, received=each.stamp + 90 * MS) if each.input == 2 else each for each in scans()]
+    left = played(lidars(), sent)
+    assert turns_of(left) == [(turn, turn, None) for turn in range(10)]
+    drops = [each for each, _ in left if not isinstance(each, Match)]
+    assert {(drop.message.input, drop.reason) for drop in drops} <= {(2, DropReason.LATE), (2, DropReason.TOO_FAR)}
+
+
+def test_one_whose_clock_is_off_leaves_the_others_in_peace_and_without_a_wait():
+    sent = [replace(each, stamp=each.stamp + 50 * MS) if each.input == 0 else each for each in scans()]
+    left = [(each, moment) for each, moment in played(lidars(), sent) if isinstance(each, Match)]
+    assert turns_of(left) == [(None, turn, turn) for turn in range(10)]
+
+
+def test_a_required_lidar_is_in_every_set_and_any_other_beside_it():
+    left = played(lidars(required=[0]), scans([(0, 2, 4), (1, 5, 7), (2, 6, 8)]))
+    assert turns_of(left) == [
+        (0, 0, 0), (1, 1, 1), (4, 4, 4), (5, None, 5), (7, 7, None), (8, 8, 8), (9, 9, 9)
+    ]  # fmt: skip
+
+
+def test_the_common_stamp_is_that_of_who_is_there():
+    away = [(0, 0, 1), (1, 1, 2)]
+    for restamp, expected in ((Restamp.EARLIEST, [1, 100]), (Restamp.LATEST, [2, 102]), (1, [1, 100])):
+        left = played(lidars(restamp=restamp), scans(away, turns=2))
+        assert [((each.stamp or 0) - START) // MS for each, _ in left if isinstance(each, Match)] == expected
+
+
+def test_thinning_counts_sets_whoever_is_missing():
+    left = played(lidars(every=2), scans([(0, 3, 6)]))
+    assert [max(filter(None, turns), default=0) for turns in turns_of(left)] == [0, 2, 4, 6, 8]
+
+
+def test_equal_stamps_of_any_two_are_a_set():
+    sent = [replace(each, stamp=START + each.turn * PERIOD) for each in scans([(1, 3, 6)])]
+    left = played(lidars(policy=ExactTime(n_inputs=3, queue_size=10)), sent)
+    assert turns_of(left) == [(turn, None if 3 <= turn < 6 else turn, turn) for turn in range(10)]
+
+
+def test_keys_need_a_required_input():
+    with pytest.raises(ValueError, match="required"):
+        lidars(policy=EqualKey(n_inputs=3, queue_size=10))
+
+
+def drawn_world(rng):
+    """Lidars that turn alike: each stamp is within slop of all of its turn; delays, losses, deaths, late ones."""
+    n_inputs = rng.choice((2, 3, 3, 4, 5))
+    slowest = rng.choice((10, 40, 150)) * MS
+    loss = rng.choice((0, 0.05, 0.3))
+    sent: list[Scan] = []
+    last: dict[int, int] = {}
+    for index in range(n_inputs):
+        away = [(start, start + rng.randrange(1, 12)) for start in rng.sample(range(60), rng.choice((0, 1, 2)))]
+        for turn in range(60):
+            if any(begin <= turn < end for begin, end in away) or rng.random() < loss:
+                continue
+            stamp = START + turn * PERIOD + rng.randrange(SLOP + 1)
+            # Of one lidar, messages come in order.
+            last[index] = max(last.get(index, 0) + 1, stamp + rng.randrange(slowest))
+            sent.append(Scan(index, turn, stamp, last[index]))
+    return n_inputs, sent
+
+
+def test_in_any_world_each_turn_with_enough_lidars_in_time_is_one_whole_set():
+    seen = {"sets": 0, "partial": 0, "late": 0}
+    for seed in range(WORLDS):
+        rng = random.Random(seed)
+        n_inputs, sent = drawn_world(rng)
+        quorum = rng.randint(1, n_inputs)
+        group, tally = lidars(n_inputs, quorum), Tally(n_inputs)
+        left = played(group, sent)
+        for scan in sent:
+            tally.fed[scan.input] += 1
+        for each, _ in left:
+            tally.note(None, [each])
+        sets = [(each, moment) for each, moment in left if isinstance(each, Match)]
+        turns = [next(iter({m.payload for m in each.messages if m is not None})) for each, _ in sets]
+        case = f"seed {seed}, {quorum} of {n_inputs}"
+        assert all(len({m.payload for m in each.messages if m is not None}) == 1 for each, _ in sets), case
+        assert all(one < other for one, other in pairwise(turns)), case
+        assert tally.agrees(group), case
+        by_turn = {turn: [scan for scan in sent if scan.turn == turn] for turn in range(60)}
+        enough = {turn: sorted(each.received for each in came)[quorum - 1 :] for turn, came in by_turn.items()}
+        dues = {turn: received[0] + MAX_WAIT for turn, received in enough.items() if received}
+        for turn, came in by_turn.items():
+            received = sorted(scan.received for scan in came)
+            if len(came) < quorum:
+                assert turn not in turns, case
+                continue
+            # A newer set that has waited long enough has the older ones leave.
+            due = min(dues[later] for later in dues if later >= turn)
+            seen["late"] += received[-1] > due
+            if received[-1] > due or any(
+                scan.received > due for each in by_turn.values() for scan in each if scan.turn < turn
+            ):
+                continue  # somebody came when this set, or an older one, had left
+            assert turn in turns, case
+            match, moment = sets[turns.index(turn)]
+            assert {m.input for m in match.messages if m is not None} == {scan.input for scan in came}, case
+            assert moment <= due, case
+            seen["partial"] += len(came) < n_inputs
+        seen["sets"] += len(sets)
+    assert seen["sets"] > 20 * WORLDS, seen
+    assert seen["partial"] > WORLDS, seen
+    assert seen["late"] > WORLDS, seen
