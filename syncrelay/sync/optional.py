@@ -43,7 +43,7 @@ class OptionalInputs(OptionalStage):
         min_periods_ns: Sequence[int] | None = None,
     ) -> None:
         self.inputs = [index for index, needed in enumerate(required) if not needed]
-        self.quorum = quorum
+        self.lacking = quorum - sum(required)
         self.queue_size = queue_size
         self.waiting = deque()
         self.came = {index: {} for index in self.inputs}
@@ -71,6 +71,9 @@ class OptionalInputs(OptionalStage):
         if len(queue) > self.queue_size:
             outcomes += self._drop(index, 1, DropReason.OVERFLOW)
         return outcomes
+
+    def oldest(self) -> Seed | None:
+        return next(self._around_messages(), None) if self._is_any else super().oldest()
 
     def seeds(self) -> Iterator[Seed]:
         return self._around_messages() if self._is_any else super().seeds()
@@ -156,9 +159,9 @@ class OptionalInputs(OptionalStage):
         while True:
             stamps = {index: self._queues[index].stamps for index in places}
             heads = {index: stamps[index][place] for index, place in places.items() if place < len(stamps[index])}
-            if len(heads) < self.quorum:
+            if len(heads) < self.lacking:
                 return
-            oldest, begin = min(heads.values()), sorted(heads.values())[self.quorum - 1] - self._slop
+            oldest, begin = min(heads.values()), sorted(heads.values())[self.lacking - 1] - self._slop
             if oldest < begin:
                 # No set of enough inputs holds what is before.
                 places = {index: bisect_left(stamps[index], begin, places[index]) for index in heads}
@@ -195,7 +198,7 @@ class OptionalInputs(OptionalStage):
         while firsts := {index: queue.stamps[0] for index, queue in self._queues.items() if queue.stamps}:
             index = min(firsts, key=firsts.__getitem__)
             last = firsts[index] + self._slop
-            if sum(self._may_have(other, last) for other in self.inputs) >= self.quorum:
+            if sum(self._may_have(other, last) for other in self.inputs) >= self.lacking:
                 break
             drops += self._drop(index, 1, DropReason.TOO_FAR)
         return drops
@@ -206,6 +209,8 @@ class OptionalInputs(OptionalStage):
         return newest is None or newest + self._least_steps[index] <= last or (bool(stamps) and stamps[0] <= last)
 
     def _drop(self, index: int, count: int, reason: DropReason) -> list[Drop]:
+        if not count:
+            return []
         queue = self._queues[index]
         for stamp in queue.stamps[:count]:
             del self.came[index][stamp]
@@ -221,7 +226,7 @@ class OptionalKeys(OptionalStage):
 
     def __init__(self, *, required: Sequence[bool], quorum: int, queue_size: int) -> None:
         self.inputs = [index for index, needed in enumerate(required) if not needed]
-        self.quorum = quorum
+        self.lacking = quorum - sum(required)
         self.queue_size = queue_size
         self.waiting = deque()
         self.came = {index: {} for index in self.inputs}

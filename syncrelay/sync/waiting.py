@@ -28,12 +28,14 @@ Seed: TypeAlias = tuple[Waiting, Waiting | None]
 class OptionalStage(Protocol):
     """Adds messages of the optional `inputs` to the sets of the required ones, which leave in the order they come.
 
-    A set of `quorum` inputs or more may leave. It does when it is decided what it takes, when `queue_size` sets wait
+    A set may leave once it is not `lacking` any. It does when it is decided what it takes, when `queue_size` sets wait
     behind it, or when `leave` is called. Older ones, which lack inputs, are superseded then.
     """
 
     inputs: Sequence[int]
-    quorum: int
+    lacking: int
+    """How many messages of these a set needs."""
+
     queue_size: int
     waiting: deque[Waiting]
 
@@ -43,6 +45,8 @@ class OptionalStage(Protocol):
     @property
     def oldest_since(self) -> int | None:
         """Since when a set has been able to leave, behind others or not; None if none is."""
+        if self.lacking <= 0:
+            return self.waiting[0].since if self.waiting else None
         return min((since for seed in self.seeds() if (since := self._since(seed)) is not None), default=None)
 
     def wait_from(self, now: int) -> None:
@@ -62,7 +66,7 @@ class OptionalStage(Protocol):
     def leave_decided(self) -> list[Outcome]:
         """Let the oldest set leave, or give it up if it lacks inputs, while nothing that may still come changes it."""
         outcomes: list[Outcome] = []
-        while (seed := next(self.seeds(), None)) is not None and self.is_decided(seed):
+        while (seed := self.oldest()) is not None and (not self.inputs or self.is_decided(seed)):
             outcomes += self.give_up(DropReason.TOO_FAR) if self._since(seed) is None else self.complete(seed)
         return outcomes
 
@@ -102,11 +106,17 @@ class OptionalStage(Protocol):
     def _since(self, seed: Seed) -> int | None:
         """Return since when a set has had enough inputs; None if it has not."""
         waiting, _ = seed
-        lacking = self.quorum - len(waiting.messages) + waiting.messages.count(None)
-        if lacking <= 0:
+        if self.lacking <= 0:
             return waiting.since
         came = sorted(self.came[index][name] for index, name in self.chosen(seed).items())
-        return max(waiting.since, came[lacking - 1]) if len(came) >= lacking else None
+        return max(waiting.since, came[self.lacking - 1]) if len(came) >= self.lacking else None
+
+    def oldest(self) -> Seed | None:
+        """Return what the oldest set may be made round."""
+        waiting = self.waiting
+        if not waiting:
+            return None
+        return waiting[0], waiting[1] if len(waiting) > 1 else None
 
     def seeds(self) -> Iterator[Seed]:
         """Yield what sets may be made round, the oldest first."""
