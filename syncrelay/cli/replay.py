@@ -182,4 +182,5 @@ def _written(output: str | None, bindings: "Sequence[GroupBinding]", opened: Exi
     writer = SetWriter(recording)
     for binding in bindings:
         writer.begin(binding)
+    _remark_all(writer.left_out)
     return writer

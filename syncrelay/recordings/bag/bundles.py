@@ -30,10 +30,10 @@ class RecordedBundle(NamedTuple):
     type_hash: str
 
 
-def recorded_bundle(group: GroupConfig, channels: Iterable[Channel]) -> RecordedBundle:
-    """Return what bundles the sets of a group that these channels give.
+def recorded_bundle(group: GroupConfig, channels: Iterable[Channel]) -> RecordedBundle | None:
+    """Return what bundles the sets of a group that these channels give; None where the type is not installed here.
 
-    Raises BagError where the type is not installed here, cannot hold the inputs, or has another definition of theirs.
+    Raises BagError where the type cannot hold the inputs, or has another definition of one than the recording.
     """
     assert group.bundle is not None  # noqa: S101  for mypy
     name = group.bundle.type
@@ -41,7 +41,7 @@ def recorded_bundle(group: GroupConfig, channels: Iterable[Channel]) -> Recorded
     text = interfaces.definition(name) if interfaces else None
     store = typestore(name, Definition("ros2msg", text)) if text else None
     if interfaces is None or text is None or store is None:
-        raise BagError(f"{group.name}: {name} is not installed here, or not sourced: its bundles cannot be written")
+        return None
     for channel in channels:
         require_same(channel, store, of=name)
     default = bytes(store.serialize_cdr(_default(store, interfaces, name), name))

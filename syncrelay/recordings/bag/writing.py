@@ -61,13 +61,15 @@ class SetWriter:
         self._payloads: dict[tuple[str, Channel], Outgoing] = {}
         self._manifests: dict[str, _Manifest] = {}
         self._bundles: dict[str, _Bundles] = {}
+        self.left_out: list[str] = []
+        """A sentence for each group whose bundles are not written, because their type is not installed here."""
         self.messages = 0
         """How many messages were written, without manifests."""
 
     def begin(self, binding: GroupBinding) -> None:
         """Add the output topics of a group; those without a message are recorded too.
 
-        Raises BagError where its sets cannot be written as bundles.
+        Raises BagError where the type of its bundles is installed and cannot hold what was recorded.
         """
         for each in binding.inputs:
             for channel in each.channels:
@@ -75,7 +77,7 @@ class SetWriter:
             if each.channels and binding.group.options.outputs:
                 self._outputs[each.output] = self._output(each)
         if binding.group.bundle is not None and binding.is_complete:
-            self._bundles[binding.group.name] = self._bundles_of(binding, binding.group.bundle)
+            self._add_bundles(binding, binding.group.bundle)
         if binding.group.options.manifest:
             self._manifests[binding.group.name] = self._manifest(binding)
 
@@ -136,12 +138,16 @@ class SetWriter:
         first = each.channels[0]
         return self._recording.add(each.output, first.type, *as_ros2(first), _profile(each))
 
-    def _bundles_of(self, binding: GroupBinding, config: BundleConfig) -> _Bundles:
+    def _add_bundles(self, binding: GroupBinding, config: BundleConfig) -> None:
         recorded = recorded_bundle(binding.group, [channel for each in binding.inputs for channel in each.channels])
+        if recorded is None:
+            why = f"{config.type} is not installed here, or not sourced"
+            self.left_out.append(f"{binding.group.name}: its bundles are left out: {why}")
+            return
         profile = matched(config.qos, [_profile(each) for each in binding.inputs if each.channels])
         topic = binding.group.inputs.node.absolute(config.topic)
         output = self._recording.add(topic, config.type, recorded.definition, recorded.type_hash, profile)
-        return _Bundles(recorded.bundle, output)
+        self._bundles[binding.group.name] = _Bundles(recorded.bundle, output)
 
 
 def _profile(each: Input) -> Profile:

@@ -67,7 +67,7 @@ class ReplayTask:
                 results = replay_groups(recording, bindings, listeners=[writer.take])
             return {
                 **about(recording, bindings),
-                **({} if self.what_if else few_sets(recording, bindings, results)),
+                **few_sets(recording, bindings, () if self.what_if else results, more=writer.left_out),
                 "messages": writer.messages,
                 "groups": [counts_of(result) for result in results],
             }
@@ -124,14 +124,20 @@ def problems_of(recording: Recording, bindings: Sequence[GroupBinding]) -> list[
     return [*lacking, *recording.faults]
 
 
-def few_sets(recording: Recording, bindings: Sequence[GroupBinding], results: Sequence[GroupResult]) -> dict[str, JSON]:
-    """Return a note for each complete group that gave few of its possible sets: what costs the others."""
+def few_sets(
+    recording: Recording,
+    bindings: Sequence[GroupBinding],
+    results: Sequence[GroupResult],
+    *,
+    more: Sequence[str] = (),
+) -> dict[str, JSON]:
+    """Return a note for each complete group that gave few of its possible sets: what costs the others; and `more`."""
     found = [
         why_few_sets(recording, binding, [each.counts for each in result.inputs], result.sets)
-        for binding, result in zip(bindings, results, strict=True)
+        for binding, result in zip(bindings, results, strict=bool(results))
         if binding.is_complete
     ]
-    notes: list[JSON] = [sentence for sentence in found if sentence is not None]
+    notes: list[JSON] = [*more, *(sentence for sentence in found if sentence is not None)]
     return {NOTES: notes} if notes else {}
 
 

@@ -11,6 +11,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from syncrelay.config import load_text
 from syncrelay.errors import BagError
 from syncrelay.recordings.fleet.task import what_decides_outputs, what_decides_sets
+from tests.cli.command import run_here
 from tests.config.ament import write_index
 from tests.recordings.bag.making import rig, rig_file, write_mcap
 from tests.recordings.bag.test_writing import payloads, write
@@ -131,10 +132,14 @@ def test_a_common_stamp_is_in_the_bundle_as_on_the_outputs(tmp_path):
         assert found.header.stamp == found.camera.header.stamp
 
 
-def test_a_type_that_is_not_installed_is_refused(tmp_path):
-    bag = write_mcap(tmp_path / "rig.mcap", _RIG)
-    with pytest.raises(BagError, match="front: other_msgs/msg/Set is not installed here, or not sourced"):
-        write(bag, tmp_path / "out.mcap", bundle={"topic": "/set", "type": "other_msgs/msg/Set"})
+def test_a_type_that_is_not_installed_is_left_out(tmp_path):
+    write_mcap(tmp_path / "rig.mcap", _RIG)
+    (tmp_path / "rig.yaml").write_text(rig_file(bundle={"topic": "/set", "type": "other_msgs/msg/Set"}))
+    done = run_here("replay", "rig.mcap", "--config", "rig.yaml", "-o", "out.mcap", folder=tmp_path)
+    said = "front: its bundles are left out: other_msgs/msg/Set is not installed here, or not sourced"
+    assert (done.returncode, said in done.stderr) == (0, True)
+    with Reader(tmp_path / "out.mcap") as reader:
+        assert {each.topic for each in reader.connections} == {"/front/camera", "/front/lidar", "/syncrelay/front/sets"}
 
 
 def test_messages_of_another_definition_are_refused_with_both(tmp_path, monkeypatch):
