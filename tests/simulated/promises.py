@@ -79,6 +79,10 @@ _AT_FIRST: Final = frozenset(
         "bursts",
     }
 )
+# Their ends are like their begins: the driver ends, and returns at once.
+_RETURN_TWICE: Final = frozenset({"best_effort", "other_type"})
+# Moments are multiples of periods, which are whole nanoseconds.
+_ROUNDED: Final = 1_000_000
 # Ticks come late, or all at once.
 _TICKS_LATE: Final = frozenset({"stall", "clock_set", "clock_stops", "clock_loops", "loops", "refuse_messages"})
 # One sensor sends nothing, or less.
@@ -325,10 +329,16 @@ class Promises:
                 yield f"{where} has fewer than {group.quorum} messages"
             if group.repeats:
                 continue
-            if len({number / plan.sensor(topic).every for topic, number in rows if number is not None}) > 1:
+            moments = [self._moment(group, topic, number) for topic, number in rows if number is not None]
+            if max(moments) - min(moments) > _ROUNDED:
                 yield f"{where} is of several moments"
             yield from self._doubled(group, one, used, where)
         yield from self._disordered(group)
+
+    def _moment(self, group: Group, topic: str, number: int) -> int:
+        """Return the moment of a message as the group knows it: by its key, or by its clock, which shows some twice."""
+        at = self.world.drivers[topic].sampled_at(number)
+        return at if group.options["policy"] == "equal_key" else self.world.stamp_at(at)
 
     def _doubled(self, group: Group, one: Set, used: dict[tuple[int, int], float], where: str) -> Iterator[str]:
         for index, number in enumerate(one.numbers):
@@ -507,7 +517,8 @@ class Promises:
         if any(KINDS[kind].spoils for kind in kinds):
             # Before its cause is known, and while the sets that it cost count.
             allowed |= {"few_sets"}
-            if any(at - step.at <= NAMED_S for step in near):
+            ends = (step.at + step.seconds for step in near if step.kind in _RETURN_TWICE)
+            if any(at - step.at <= NAMED_S for step in near) or any(0 <= at - end <= NAMED_S for end in ends):
                 allowed |= {"over_slop"}
             allowed |= {"waiting_for_optional"} if group.optional else set()
         if self.world.plan.by_sim_time and "other_clock" in kinds:

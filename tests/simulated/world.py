@@ -118,9 +118,13 @@ class Driver:
             self._end_life()
             self.participant.kill()
 
+    def sampled_at(self, number: int) -> int:
+        """When a message is sampled, in monotonic time."""
+        return _FIRST + number * self.period
+
     def _plan_next(self, life: int) -> None:
         scheduler = self.world.scheduler
-        at = _FIRST + self._number * self.period
+        at = self.sampled_at(self._number)
         due = at + self.sensor.takes
         if self.batch:
             due = -(-due // self.batch) * self.batch
