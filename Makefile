@@ -150,12 +150,21 @@ $(VENV)/lerobot: $(BIN)/python $(BUILT_OF)
 	$(BIN)/python -m pip install -q -e '.[datasets]' 'lerobot[dataset]>=0.6.1,<0.7' hypothesis pytest pytest-timeout
 	touch $@
 
-# What ros-dev-tools and a sourced ROS bring on a robot: colcon, CMake, and of ament_cmake what the wheels forget to ask for.
+# What ros-dev-tools and a sourced ROS bring on a robot: colcon, CMake, and of ament_cmake and rosidl what the wheels forget to
+# ask for; their CMake files name folders of the machine that built them.
 # In a venv of its own, as colcon brings plugins for pytest.
 $(VENV)/colcon/done: $(BIN)/python
 	$(BIN)/python -m venv $(VENV)/colcon
-	$(VENV)/colcon/bin/python -m pip install -q colcon-common-extensions cmake 'setuptools<80' ros-jazzy-ament-package \
-		ros-jazzy-ament-cmake ros-jazzy-ament-cmake-include-directories ros-jazzy-ament-cmake-python
+	$(VENV)/colcon/bin/python -m pip install -q colcon-common-extensions cmake 'setuptools<80' numpy ros-jazzy-sensor-msgs \
+		$(addprefix ros-jazzy-ament-,package index-python cmake cmake-include-directories cmake-python cmake-ros \
+			cmake-export-definitions cmake-gtest cmake-gmock cmake-pytest) \
+		$(addprefix ros-jazzy-rosidl-,default-generators default-runtime core-generators core-runtime adapter cli cmake parser \
+			pycommon runtime-c runtime-cpp generator-c generator-cpp generator-py generator-type-description \
+			typesupport-c typesupport-cpp typesupport-fastrtps-c typesupport-fastrtps-cpp typesupport-interface \
+			typesupport-introspection-c typesupport-introspection-cpp dynamic-typesupport) \
+		$(addprefix ros-jazzy-,action-msgs service-msgs fastrtps-cmake-module fastcdr rmw rcutils rcpputils rpyutils \
+			python-cmake-module)
+	$(VENV)/colcon/bin/python tests/workspace/exported_paths.py
 	touch $@
 
 $(VENV)/lint: $(BIN)/python pyproject.toml .ci/constraints.txt

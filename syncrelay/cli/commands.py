@@ -64,6 +64,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
         Command("validate FILE...", "check files; show every error at its line", works_on=_FILE),
         Command("diff OLD NEW", "say what a reload to another file would do", works_on=_FILE),
         Command("graph FILE...", "draw the groups of files as Mermaid or text", works_on=_FILE),
+        Command("interfaces FILE...", "write messages that hold the sets of files"),
         Command(
             "init --from-bag BAG", "propose a file for a recording, or for a live graph", (_RECORDINGS,), works_on=_BAGS
         ),

@@ -63,6 +63,8 @@ def _try(text: str, folder: Path, seed: str) -> None:
     where = f"seed {seed}\n{text}"
     _run("validate", "fusion.yaml", folder=folder, where=where, codes=(0,))
     _run("graph", "fusion.yaml", folder=folder, where=where, codes=(0,))
+    # Types may come from the graph.
+    _run("interfaces", "fusion.yaml", "-o", "messages", folder=folder, where=where, codes=(0, 2))
     _run("diff", "fusion.yaml", "fusion.yaml", folder=folder, where=where, codes=(0,))
     for bag in ("rig.mcap", "empty.mcap"):
         of = ("--config", "fusion.yaml", bag)
