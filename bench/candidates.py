@@ -6,6 +6,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import sysconfig
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -73,17 +74,20 @@ class Candidate:
     folder: Path | None = None
     hear: Sequence[str] = ()
     tap: Sequence[str] = ()
+    bundles: Sequence[str] = ()
+    """The topics of its bundles, where its sets leave as one message each."""
 
 
-# Scalars on /diagnostics; manifests that someone hears; neither watching nor telling; sets and drops that are tapped.
-SWITCHES = {"scalars", "heard", "untold", "tapped"}
+# Scalars on /diagnostics; manifests that someone hears; neither watching nor telling; sets and drops that are tapped;
+# sets as one message each.
+SWITCHES = {"scalars", "heard", "untold", "tapped", "bundled"}
 
 
 class Workshop:
     """Makes candidates with their files in a folder; the help of compare.py explains their names."""
 
     def __init__(self, folder):
-        self._folder, self._files, self._floor = folder, 0, None
+        self._folder, self._files, self._floor, self._built = folder, 0, None, set()
 
     def candidate(self, word, load):
         """Return the candidate of a name; raises ValueError if there is none, or if it cannot run here."""
@@ -104,13 +108,39 @@ class Workshop:
             raise ValueError(f"{word}: no setting is called {', '.join(sorted(wrong))}")
         environ = {"PYTHONPATH": str(checkout), **{name: value for name, value in asked.items() if value}}
         port = _free_port()
+        is_bundled = "bundled" in switches
+        if is_bundled:
+            environ |= self._with_messages(load, environ)
         command = [python, *self._entry(load, switches, coalesce, port)]
         # What it prints is read by nobody else.
         follow = f'exec "$0" -m syncrelay tap --url http://127.0.0.1:{port} > /dev/null'
         tap = ["sh", "-c", follow, python] if "tapped" in switches else []
         hear = [f"/syncrelay/g{group}/sets" for group in range(load.groups)] if "heard" in switches else []
         # `-m` looks where it is started first.
-        return Candidate(word, load, command, environ, checkout, hear, tap)
+        bundles = [f"/g{group}/set" for group in range(load.groups)] if is_bundled else []
+        return Candidate(word, load, command, environ, checkout, hear, tap, bundles)
+
+    def _with_messages(self, load, environ):
+        """Build a message that holds a set of the load, and return what sources its package."""
+        prefix = self._folder / f"messages{load.topics}{load.type_name}"
+        if prefix not in self._built:
+            package = self._folder / "sources" / prefix.name / "bench_msgs"
+            (package / "msg").mkdir(parents=True)
+            (package / "package.xml").write_text(
+                "<package><name>bench_msgs</name><depend>sensor_msgs</depend></package>"
+            )
+            fields = "".join(f"sensor_msgs/{load.type_name} input{index}\n" for index in range(load.topics))
+            (package / "msg/Set.msg").write_text(f"std_msgs/Header header\n{fields}")
+            builder = HERE.parent / "docker/build_messages.py"
+            subprocess.run([sys.executable, str(builder), "--into", str(prefix), str(package)], check=True)
+            self._built.add(prefix)
+        packages = sysconfig.get_path("purelib", vars={"base": str(prefix)})
+        return {
+            "AMENT_PREFIX_PATH": str(prefix),
+            # With that of this process: the wheels of ROS have set it, and would not do so again.
+            "LD_LIBRARY_PATH": f"{prefix / 'lib'}:{os.environ.get('LD_LIBRARY_PATH', '')}",
+            "PYTHONPATH": f"{packages}:{environ['PYTHONPATH']}",
+        }
 
     def _entry(self, load, switches, coalesce, port):
         keys: dict[str, Any] = {"metrics": {"listen": f"127.0.0.1:{port}"}}
@@ -122,7 +152,14 @@ class Workshop:
             keys["node"] = {"coalesce": coalesce}
         self._files += 1
         path = self._folder / f"relay{self._files}.yaml"
-        path.write_text(json.dumps({"version": 1, **keys, "groups": _groups(load)}))
+        groups = _groups(load)
+        if "bundled" in switches:
+            for name, group in groups.items():
+                fields = {f"input{index}": each["topic"] for index, each in enumerate(group["topics"])}
+                group["topics"] = [{"topic": each["topic"], "type": each["type"]} for each in group["topics"]]
+                bundle = {"topic": f"/{name}/set", "type": "bench_msgs/msg/Set", "fields": fields}
+                group |= {"outputs": False, "bundle": bundle}
+        path.write_text(json.dumps({"version": 1, **keys, "groups": groups}))
         return (
             [str(HERE / "untold.py"), str(path)] if "untold" in switches else ["-m", "syncrelay", "--config", str(path)]
         )

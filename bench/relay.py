@@ -61,6 +61,10 @@ class Tables:
         for load in (SMALL, "2 x 1 kHz x 1 kB"):
             self._compare(load, [CHECKOUT, f"{CHECKOUT}@tapped"])
 
+    def bundled(self):
+        for load in (SMALL, "2 x 20 Hz x 1 MB"):
+            self._compare(load, [CHECKOUT, f"{CHECKOUT}@bundled"])
+
     def large(self):
         self._loads("large messages", LARGE_LOADS)
 
@@ -117,13 +121,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=30, help="rounds of a table at most (default: %(default)s)")
     parser.add_argument(
-        "parts", nargs="*", metavar="PART", help="cost, telling, tapped, large, scale or rest (default: all)"
+        "parts", nargs="*", metavar="PART", help="cost, telling, tapped, bundled, large, scale or rest (default: all)"
     )
     asked = parser.parse_args()
     print(f"Python {sys.version.split()[0]}, {os.cpu_count()} cores\n")
     with tempfile.TemporaryDirectory() as folder:
         tables = Tables(Workshop(Path(folder)), asked.rounds)
-        there = (tables.cost, tables.telling, tables.tapped, tables.large, tables.scale, tables.rest)
+        there = (tables.cost, tables.telling, tables.tapped, tables.bundled, tables.large, tables.scale, tables.rest)
         parts = {each.__name__: each for each in there}
         if unknown := set(asked.parts) - set(parts):
             parser.error(f"no part is called {', '.join(sorted(unknown))}")

@@ -1,7 +1,7 @@
 """The publisher and the receiver around a relay under test, each a process that rounds.py starts.
 
     rig.py publish TYPE --size BYTES --rate HZ --together N --apart SECONDS TOPIC...
-    rig.py receive TYPE --together N [--hear MANIFEST] TOPIC...
+    rig.py receive TYPE --together N [--bundled] [--hear MANIFEST] TOPIC...
 
 Both say `ready` when DDS has matched them, and then wait for turns on stdin. Stamps are times of publishing by the
 system clock, so that the age of a set's last message, when it comes back, is its latency.
@@ -12,6 +12,7 @@ import json
 import statistics
 import sys
 import time
+from importlib import import_module
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -67,6 +68,10 @@ def receive(node, asked):
     Prints how many came, and the median age of sets.
     """
     kind, topics = TYPES[asked.type], asked.topics
+    # A bundle counts as its messages, and is a set by itself.
+    each, together = (asked.together, 1) if asked.bundled else (1, asked.together)
+    if asked.bundled:
+        kind = import_module("bench_msgs.msg").Set
     subscriptions = [node.create_subscription(kind, topic, print, PROFILE, raw=True) for topic in topics]
     # DDS receives and acknowledges manifests, whether anyone takes them or not.
     heard = [node.create_subscription(DiagnosticArray, topic, print, 500, raw=True) for topic in asked.hear]
@@ -84,9 +89,9 @@ def receive(node, asked):
             for index, subscription in enumerate(subscriptions):
                 while wait_set.is_ready("subscription", index) and (taken := take(subscription.handle, kind)):
                     stamp, last = read_stamp(taken[0]) or 0, time.monotonic()
-                    came += stamp >= since
+                    came += each * (stamp >= since)
                     # The last topic of a set completes it: the others wait for it, whatever the relay.
-                    if stamp >= since and (index + 1) % asked.together == 0:
+                    if stamp >= since and (index + 1) % together == 0:
                         ages.append(time.time_ns() - stamp)
         say([came, statistics.median(ages) if ages else 0])
 
@@ -108,6 +113,7 @@ def main():
     parser.add_argument("--rate", type=float)
     parser.add_argument("--together", type=int)
     parser.add_argument("--apart", type=float)
+    parser.add_argument("--bundled", action="store_true")
     parser.add_argument("--hear", action="append", default=[])
     asked = parser.parse_args()
     rclpy.init()

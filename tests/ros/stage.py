@@ -157,10 +157,11 @@ class Stage:
         node: str = "player",
         reliability: str = "reliable",
         durability: str = "volatile",
+        before: Sequence[str] = (),
     ) -> Player:
-        """A process that publishes on these topics, by name with their types."""
+        """A process that publishes on these topics, by name with their types; `before` are words before its command."""
         argv = _module("tests.ros.player", topics, node=node, reliability=reliability, durability=durability)
-        return Player(self.start("player", argv, stdin=subprocess.PIPE), self.folder)
+        return Player(self.start("player", [*before, *argv], stdin=subprocess.PIPE), self.folder)
 
     def collector(
         self,
@@ -169,12 +170,15 @@ class Stage:
         node: str = "collector",
         reliability: str = "reliable",
         durability: str = "volatile",
+        before: Sequence[str] = (),
     ) -> Collector:
-        """A process that subscribes to these topics, by name with their types."""
+        """A process that subscribes to these topics, by name with their types; `before` as with the player."""
         output = self.folder / f"collected-{len(self._processes)}.frames"
         output.touch()
         argv = _module("tests.ros.collector", topics or {}, node=node, reliability=reliability, durability=durability)
-        return Collector(self.start("collector", [*argv, "--output", str(output)], stdin=subprocess.PIPE), output)
+        return Collector(
+            self.start("collector", [*before, *argv, "--output", str(output)], stdin=subprocess.PIPE), output
+        )
 
     def caller(self, node: str = "/syncrelay") -> "Caller":
         """What calls services of a node."""
