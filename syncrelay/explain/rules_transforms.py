@@ -1,6 +1,5 @@
 """The finding about transforms: which edge is missing, by how much it lags, and with what wait sets would leave."""
 
-from collections import Counter
 from collections.abc import Sequence
 from typing import Final
 
@@ -17,7 +16,7 @@ _CHECK_BROADCASTER: Final = "check the node that publishes it on /tf"
 
 
 def no_transform(facts: GroupFacts) -> Found:
-    """Find sets that were dropped because they could not be transformed, by what most of them lacked."""
+    """Find sets that were dropped because they could not be transformed."""
     dropped = max(each.figures.dropped.get(DropReason.NO_TRANSFORM, 0) for each in facts.inputs)
     if not dropped or not facts.lapses or facts.transforms is None:
         return
@@ -27,13 +26,11 @@ def no_transform(facts: GroupFacts) -> Found:
         lapses = [each for each in lapses if each.missing.lack is not Lack.PAST]
     if not lapses:
         return
-    needed = [each.needed_ns for each in facts.lapses if each.needed_ns is not None][-dropped:]
-    (most, _), *_ = Counter(
-        (each.input, each.missing.lack, each.missing.parent, each.missing.child) for each in lapses
-    ).most_common(1)
-    last = next(each for each in reversed(lapses) if _of(each) == most)
+    covered = [each for each in facts.lapses if each.needed_ns is not None][-dropped:]
+    # What the last of them lacked: what those before lacked may have come.
+    last = lapses[-1]
     an_input = facts.inputs[last.input]
-    text, cure = _told(last.missing, an_input, needed, facts)
+    text, cure = _told(last.missing, an_input, covered, facts)
     sets = f"{counted(dropped, 'set')} {'was' if dropped == 1 else 'were'}"
     yield Fault(
         f"{text}: {sets} dropped as no_transform in the last 10 s",
@@ -43,16 +40,12 @@ def no_transform(facts: GroupFacts) -> Found:
     )
 
 
-def _of(lapse: Lapse) -> tuple[int, Lack, str, str]:
-    return lapse.input, lapse.missing.lack, lapse.missing.parent, lapse.missing.child
-
-
-def _told(missing: Missing, an_input: InputFacts, needed: Sequence[int], facts: GroupFacts) -> tuple[str, str]:
+def _told(missing: Missing, an_input: InputFacts, covered: Sequence[Lapse], facts: GroupFacts) -> tuple[str, str]:
     """Say what an input lacks, and what to do."""
     name = an_input.name
     match missing.lack:
         case Lack.LATE:
-            return _late(missing, name, needed, facts)
+            return _late(missing, name, covered, facts)
         case Lack.PAST:
             text = f"the oldest transform {_edge(missing)} is {words.span_of_time(missing.by_ns)} newer than {name}"
             cure = "check whether the clocks of both agree; tf2 keeps transforms for 10 s"
@@ -80,17 +73,19 @@ def _edge(missing: Missing) -> str:
     return f"{missing.parent} -> {missing.child}"
 
 
-def _late(missing: Missing, name: str, needed: Sequence[int], facts: GroupFacts) -> tuple[str, str]:
+def _late(missing: Missing, name: str, covered: Sequence[Lapse], facts: GroupFacts) -> tuple[str, str]:
     edge, wait = _edge(missing), facts.transforms.wait if facts.transforms is not None else 0
-    longest = max(needed, default=0)
-    if not needed:
-        if not missing.by_ns:
-            return f"nothing is known of {edge} yet", _CHECK_BROADCASTER
+    needed = max((each.needed_ns or 0 for each in covered), default=0)
+    if not covered and not missing.by_ns:
+        return f"nothing is known of {edge} yet", _CHECK_BROADCASTER
+    if not covered:
         return f"{edge} is {words.span_of_time(missing.by_ns)} behind {name}", _CHECK_BROADCASTER
-    text = f"{edge} is {words.duration(longest)} behind {name}"
-    if longest <= wait:
+    times = [each.covered or 0 for each in covered]
+    # What came back after a break had all that waited leave at once, or nearly: no wait is for that.
+    if max(times) - min(times) < needed or needed > _LONGEST_WAIT:
+        return f"{edge} was up to {words.duration(needed)} behind {name}", _CHECK_BROADCASTER
+    text = f"{edge} is {words.duration(needed)} behind {name}"
+    if needed <= wait:
         size = 2 * facts.queue_size
         return f"{text}, and no more than {counted(facts.queue_size, 'set')} can wait", f"write `queue_size: {size}`"
-    if longest > _LONGEST_WAIT:
-        return text, _CHECK_BROADCASTER
-    return text, f"write `wait: {words.at_least(min(longest + longest // 10, _LONGEST_WAIT))}`"
+    return text, f"write `wait: {words.at_least(min(needed + needed // 10, _LONGEST_WAIT))}`"

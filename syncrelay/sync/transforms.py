@@ -9,8 +9,9 @@ from typing import Final, Protocol
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.thinning import Withheld
 
-# How many of the sets that were given up are followed, and for how long, to see when they could have left.
-_FOLLOWED: Final = 64
+# So many of the sets that were given up are followed, for so long, to see when they could have left: those of 10 s at
+# 50 Hz, as long as tf2 keeps transforms.
+_FOLLOWED: Final = 500
 _FOLLOWED_NS: Final = 10_000_000_000
 
 
@@ -74,14 +75,16 @@ class Transforms:
 
 @dataclass(frozen=True, slots=True)
 class Lapse:
-    """A set that was given up: which input lacked what. `needed_ns` is the wait with which it would have left.
+    """A set that was given up: which input lacked what.
 
-    `needed_ns` is None while that is not known.
+    `needed_ns` is the wait with which it would have left, `covered` when it could have, by the time of the group's
+    calls. Both are None while that is not known.
     """
 
     input: int
     missing: Missing
     needed_ns: int | None = None
+    covered: int | None = None
 
 
 @dataclass(slots=True)
@@ -112,7 +115,7 @@ class TransformStage:
         self._withheld = Withheld(n_inputs, DropReason.NO_TRANSFORM) if repeats else None
         self._passed: list[int | None] = [None] * n_inputs
         self._followed: deque[_Needs] = deque(maxlen=_FOLLOWED)
-        self.lapses: deque[Lapse] = deque(maxlen=_FOLLOWED)
+        self.lapses: deque[Lapse] = deque(maxlen=2 * _FOLLOWED)
         """The sets that were given up last, oldest first; and once more when it is known what wait they needed."""
 
     def take(self, outcomes: Sequence[Outcome], now: int) -> list[Outcome]:
@@ -230,7 +233,7 @@ class TransformStage:
                 return
             lapse = first.lapse
             if self._look(first) is None and lapse is not None:
-                self.lapses.append(replace(lapse, needed_ns=now - first.since))
+                self.lapses.append(replace(lapse, needed_ns=now - first.since, covered=now))
             elif now - first.since < _FOLLOWED_NS:
                 return
             self._followed.popleft()

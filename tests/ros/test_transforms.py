@@ -107,3 +107,18 @@ def test_what_waits_when_the_relay_ends_is_dropped_as_shutdown(stage: Stage):
         assert _left(collector) == [[], []]
     dropped = [each.dropped for each in read_summary(relay.stderr)["front"].inputs.values()]
     assert all(each.get("shutdown") == 2 for each in dropped), dropped
+
+
+def test_who_observes_waits_for_transforms_too_and_says_which_is_missing(stage: Stage):
+    static = stage.player({"/tf_static": TF}, node="static", durability="transient_local")
+    static.is_up()
+    static.play([transforms("/tf_static", ("base_link", "camera", 0))])
+    look = stage.observe(config({"front": _group(wait="50ms")}), "--seconds", "9")
+    player = stage.player(_INPUTS)
+    player.match()
+    player.start(
+        [frame._replace(time=n * _PERIOD) for n in range(120) for frame in _pair(BEGIN + n * _PERIOD)], speed=1
+    )
+    look.wait()
+    assert "no transform names the target odom: " in look.stdout
+    assert "exit code 1: front has 1 error" in look.stdout

@@ -86,7 +86,7 @@ def test_a_set_that_waited_too_long_is_dropped_and_says_what_it_lacked_and_how_l
     assert [*engine.lapses] == [late]
     frames.add(moving(START + 5 * MS))
     assert engine.expire(now=START + 181 * MS) == []
-    assert [*engine.lapses] == [late, Lapse(0, late.missing, needed_ns=180 * MS)]
+    assert [*engine.lapses] == [late, Lapse(0, late.missing, needed_ns=180 * MS, covered=START + 181 * MS)]
 
 
 def test_a_message_without_a_frame_is_given_up_at_once():

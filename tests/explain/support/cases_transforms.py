@@ -14,7 +14,7 @@ TRANSFORMS = TransformsConfig.model_validate({"target": "base_link", "wait": "10
 def given_up(lack, *, parent="odom", child="base_link", by=0, needed=(), count=30, group=a_group, **facts):
     """A group of which the last 30 sets were given up, for one reason; some of them could leave after a longer wait."""
     lapse = Lapse(0, Missing(lack, parent, child, by))
-    followed = [replace(lapse, needed_ns=each) for each in needed]
+    followed = [replace(lapse, needed_ns=each, covered=number * 100 * MS) for number, each in enumerate(needed)]
     inputs = camera(figures={"dropped": {DropReason.NO_TRANSFORM: count}}), LIDAR
     return group(*inputs, transforms=TRANSFORMS, lapses=(*[lapse] * count, *followed), **facts)
 
@@ -23,12 +23,15 @@ def given_up(lack, *, parent="odom", child="base_link", by=0, needed=(), count=3
 FOUND = {
     "a transform that comes late": given_up(Lack.LATE, by=80 * MS, needed=[170 * MS, 180 * MS, 150 * MS]),
     "a transform that comes late, and no set leaves": given_up(
-        Lack.LATE, by=80 * MS, needed=[180 * MS], group=a_silent_group
+        Lack.LATE, by=80 * MS, needed=[180 * MS] * 3, group=a_silent_group
     ),
     "a transform that comes too late for any wait": given_up(Lack.LATE, by=11 * S, needed=[12 * S]),
+    "a transform that was away for a while": given_up(
+        Lack.LATE, by=3 * S, needed=[3 * S - n * 100 * MS for n in range(20)], count=20
+    ),
     "a transform that has stopped": given_up(Lack.LATE, by=7 * S),
     "a transform of which nothing came since the clock jumped back": given_up(Lack.LATE),
-    "more sets than can wait": given_up(Lack.LATE, by=20 * MS, needed=[90 * MS], queue_size=2),
+    "more sets than can wait": given_up(Lack.LATE, by=20 * MS, needed=[90 * MS] * 2, queue_size=2),
     "a transform that began after the message": given_up(Lack.PAST, by=300 * MS, count=1, group=a_silent_group),
     "a frame that no transform names": given_up(Lack.UNKNOWN_FRAME, parent="base_link", child="camera_lens"),
     "a target that no transform names": given_up(Lack.UNKNOWN_FRAME, parent="base_link", child="base_link"),
