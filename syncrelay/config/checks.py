@@ -257,6 +257,9 @@ def _quorum(group: GroupConfig, document: Document) -> Iterator[Problem]:
             f" use {able}"
         )
         yield document.problem(path, text, code="conflict")
+    elif not required and group.options.tolerance is None and group.options.distance is Distance.SPAN:
+        text = "a quorum without a required input needs a `slop`: without one any messages belong together"
+        yield document.problem(path, text, code="conflict")
 
 
 def _unit(group: GroupConfig, document: Document) -> Iterator[Problem]:

@@ -94,6 +94,21 @@ def _text(pattern: str, **limits: int) -> WithJsonSchema:
 Duration = Annotated[int, BeforeValidator(not_negative), WithJsonSchema(duration_schema(sign=r"\+?", minimum=0))]
 """A duration of 0 or more, in nanoseconds."""
 
+NONE: Final = "none"
+"""What stands in the file for a limit that is not there."""
+
+
+def _or_none(value: Any) -> int | None:
+    return None if value == NONE else not_negative(value)
+
+
+DurationOrNone = Annotated[
+    int | None,
+    PlainValidator(_or_none),
+    WithJsonSchema({"anyOf": [*duration_schema(sign=r"\+?", minimum=0)["anyOf"], {"const": NONE}]}),
+]
+"""A duration of 0 or more, in nanoseconds; None for `none`."""
+
 _LONGEST_PAUSE_NS: Final = 100_000_000
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from syncrelay.config.keys import NOT_NULL, Duration, FieldPath, Trigger
+from syncrelay.config.keys import NOT_NULL, Duration, DurationOrNone, FieldPath, Trigger
 from syncrelay.config.models import (
     AgedTopic,
     Distance,
@@ -31,20 +31,23 @@ from syncrelay.sync import (
 )
 
 Slop = Field(
-    description="Largest span of a set, inclusive. A number is seconds, a string has a unit (ns, us, ms, s, min).",
-    examples=["20ms"],
+    description=(
+        "Largest span of a set, inclusive; or `none`: then the nearest messages are a set, however far apart, as in C++"
+        " ApproximateTime without a maximum interval. A number is seconds, a string has a unit (ns, us, ms, s, min)."
+    ),
+    examples=["20ms", "none"],
 )
 
 
 class SlopGroup(Group):
     """A group whose sets may be as wide as `slop`."""
 
-    slop: Duration = Slop
+    slop: DurationOrNone = Slop
 
     @property
-    def tolerance(self) -> Tolerance:
-        """The largest span of a set."""
-        return Tolerance("slop", self.slop)
+    def tolerance(self) -> Tolerance | None:
+        """The largest span of a set; None where it may be any."""
+        return None if self.slop is None else Tolerance("slop", self.slop)
 
 
 class ExactTimeGroup(Group):

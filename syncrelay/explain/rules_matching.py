@@ -158,7 +158,7 @@ def constant_offset(facts: GroupFacts) -> Found:
     Of two inputs of one rate, the messages that are nearest by their stamps come whole periods apart: those that come
     together were made together. A delay alone does not show here, as it leaves the right stamps near each other.
     """
-    if facts.tolerance is None or any(map(facts.is_held, range(len(facts.inputs)))) or next(other_clock(facts), None):
+    if not facts.by_stamp or any(map(facts.is_held, range(len(facts.inputs)))) or next(other_clock(facts), None):
         return
     first, *others = [index for index, each in enumerate(facts.inputs) if each.required]
     for other in others:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
-from syncrelay.sync.policy import Queued
+from syncrelay.sync.policy import Queued, limit_of
 
 
 class ApproximateEpsilonTime(Queued):
@@ -24,11 +24,9 @@ class ApproximateEpsilonTime(Queued):
 
     __slots__ = ("_epsilon", "_losses", "_queue_size", "_queues", "n_inputs")
 
-    def __init__(self, *, n_inputs: int, queue_size: int, epsilon_ns: int) -> None:
+    def __init__(self, *, n_inputs: int, queue_size: int, epsilon_ns: int | None) -> None:
         self.make_queues(n_inputs, queue_size)
-        if epsilon_ns < 0:
-            raise ValueError(f"epsilon_ns {epsilon_ns} must be 0 or more")
-        self._epsilon = epsilon_ns
+        self._epsilon = limit_of(epsilon_ns, "epsilon_ns")
 
     def for_required(self, required: Sequence[bool], quorum: int) -> tuple["ApproximateEpsilonTime", OptionalInputs]:
         size, epsilon = self._queue_size, self._epsilon

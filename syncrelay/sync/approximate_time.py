@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
-from syncrelay.sync.policy import Queued, of_required
+from syncrelay.sync.policy import Queued, limit_of, of_required
 
 _STEPS = 8
 """A search strides only after this many single steps. Most searches take fewer, and a stride costs several steps."""
@@ -15,9 +15,9 @@ class ApproximateTime(Queued):
     """The set of least span around each pivot leaves as soon as no later message can make a better one.
 
     On messages that arrive in stamp order, the sets are those of C++ message_filters' ApproximateTime, at the same
-    moments; `slop_ns` is its max interval (inclusive) and `min_periods_ns` its lower bounds between messages. Unlike
-    there, queues are in stamp order, so that messages that arrive out of order are used; a message whose stamp is still
-    queued replaces the queued one; and every message that leaves unmatched is reported.
+    moments; `slop_ns` is its max interval (inclusive; None for none) and `min_periods_ns` its lower bounds between
+    messages. Unlike there, queues are in stamp order, so that messages that arrive out of order are used; a message
+    whose stamp is still queued replaces the queued one; and every message that leaves unmatched is reported.
 
         lidar  |a..b....c
         camera |....B....
@@ -61,17 +61,17 @@ class ApproximateTime(Queued):
         *,
         n_inputs: int,
         queue_size: int,
-        slop_ns: int,
+        slop_ns: int | None,
         age_penalty: float = 0.1,
         min_periods_ns: Sequence[int] | None = None,
     ) -> None:
         periods = (0,) * n_inputs if min_periods_ns is None else tuple(min_periods_ns)
         self.make_queues(n_inputs, queue_size)
-        if slop_ns < 0 or not 0 <= age_penalty < float("inf"):
-            raise ValueError(f"slop_ns {slop_ns} and age_penalty {age_penalty} must be 0 or more")
+        self._slop = limit_of(slop_ns)
+        if not 0 <= age_penalty < float("inf"):
+            raise ValueError(f"age_penalty {age_penalty} must be 0 or more")
         if len(periods) != n_inputs or any(period < 0 for period in periods):
             raise ValueError(f"min_periods_ns {periods} must be {n_inputs} numbers, 0 or more")
-        self._slop = slop_ns
         self._age_penalty = age_penalty
         self._scale = (1.0 + age_penalty).as_integer_ratio()
         self._min_periods = periods

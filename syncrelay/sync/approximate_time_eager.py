@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
-from syncrelay.sync.policy import Queued
+from syncrelay.sync.policy import Queued, limit_of
 
 
 class ApproximateTimeEager(Queued):
@@ -27,11 +27,9 @@ class ApproximateTimeEager(Queued):
 
     __slots__ = ("_losses", "_queue_size", "_queues", "_slop", "_stamps", "n_inputs")
 
-    def __init__(self, *, n_inputs: int, queue_size: int, slop_ns: int) -> None:
+    def __init__(self, *, n_inputs: int, queue_size: int, slop_ns: int | None) -> None:
         self.make_queues(n_inputs, queue_size)
-        if slop_ns < 0:
-            raise ValueError(f"slop_ns {slop_ns} must be 0 or more")
-        self._slop = slop_ns
+        self._slop = limit_of(slop_ns)
         self._stamps = [queue.stamps for queue in self._queues]
 
     def for_required(self, required: Sequence[bool], quorum: int) -> tuple["ApproximateTimeEager", OptionalInputs]:

@@ -1,11 +1,14 @@
 """What a group requires of a policy."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Final, Protocol
 
 from syncrelay.sync.messages import Drop, DropReason, Message, Outcome
 from syncrelay.sync.queues import Losses, StampQueue
 from syncrelay.sync.waiting import OptionalStage
+
+# Farther apart than stamps can be, which have 32 bits of seconds.
+_ANY_DISTANCE: Final = 2**63
 
 
 class Policy(Protocol):
@@ -109,6 +112,13 @@ class Queued(Policy, Protocol):
 
     def needed_queue(self, place: int) -> int | None:
         return self._losses.needed[place]
+
+
+def limit_of(slop_ns: int | None, name: str = "slop_ns") -> int:
+    """Return how far apart stamps may be, for None as far as any are. Raises ValueError if it is negative."""
+    if slop_ns is not None and slop_ns < 0:
+        raise ValueError(f"{name} {slop_ns} must be 0 or more, or None")
+    return _ANY_DISTANCE if slop_ns is None else slop_ns
 
 
 def check_sizes(n_inputs: int, queue_size: int) -> None:

@@ -160,6 +160,7 @@ OPTIONS: dict[str, Row] = {
     "policy": (file(), file(EXACT), NEAR_PAIRS),
     "queue_size": of_group(ONE_INPUT_AHEAD, EXACT, queue_size=(1, 2)),
     "slop": of_group(WIDER_PAIRS, slop="5ms"),
+    "slop: none": of_group(WIDER_PAIRS, slop=("5ms", "none")),
     "age_penalty": of_group(TWO_SPANS_TO_CHOOSE_FROM, age_penalty=(0, 1)),
     "restamp": of_group(NEAR_PAIRS, restamp="earliest"),
     "restamp: latest": of_group(NEAR_PAIRS, restamp=("earliest", "latest")),

@@ -34,12 +34,12 @@ class Stream:
     n_inputs: int
     queue_size: int
     age_penalty: float
-    slop_ns: int
+    slop_ns: int | None
     min_periods_ns: tuple
     events: list
 
     def as_approximate(self):
-        options = (self.age_penalty, self.slop_ns, *self.min_periods_ns)
+        options = (self.age_penalty, -1 if self.slop_ns is None else self.slop_ns, *self.min_periods_ns)
         return " ".join(map(str, ("approximate", self.n_inputs, self.queue_size, *options, self.fed())))
 
     def as_exact(self):
@@ -70,7 +70,7 @@ def draw(seed):
         n_inputs=n_inputs,
         queue_size=rng.choice((2, 3, 5, 10, 20, 50, 100)),
         age_penalty=rng.choice(AGE_PENALTIES),
-        slop_ns=rng.choice((0, 5 * MS, 20 * MS, 50 * MS, 200 * MS, 1_000 * MS, 3_600_000 * MS)),
+        slop_ns=rng.choice((0, 5 * MS, 20 * MS, 50 * MS, 200 * MS, 1_000 * MS, None)),
         min_periods_ns=tuple(rng.choice((0, 5 * MS, 50 * MS)) if bounded else 0 for _ in range(n_inputs)),
         events=in_order(rng, n_inputs, rng.randint(50, 450)),
     )

@@ -31,7 +31,7 @@ _STREAMS = chosen(short=100, long=3_000)
 
 def approximate_time(rng, sizes):
     options = {
-        "slop_ns": rng.choice((0, 5 * MS, 50 * MS, 500 * MS, 3_600_000 * MS)),
+        "slop_ns": rng.choice((0, 5 * MS, 50 * MS, 500 * MS, None)),
         "age_penalty": rng.choice((*AGE_PENALTIES, 0.7)),
         "min_periods_ns": [rng.choice((0, 0, 8 * MS, 60 * MS)) for _ in range(sizes["n_inputs"])],
     }
@@ -43,12 +43,12 @@ def exact_time(_, sizes):
 
 
 def approximate_time_eager(rng, sizes):
-    slop = rng.choice((0, 5 * MS, 30 * MS, 100 * MS))
+    slop = rng.choice((0, 5 * MS, 30 * MS, 100 * MS, None))
     return ApproximateTimeEager(**sizes, slop_ns=slop), ReferenceEager(**sizes, slop_ns=slop)
 
 
 def approximate_epsilon_time(rng, sizes):
-    epsilon = rng.choice((0, 5 * MS, 50 * MS, 500 * MS))
+    epsilon = rng.choice((0, 5 * MS, 50 * MS, 500 * MS, None))
     return ApproximateEpsilonTime(**sizes, epsilon_ns=epsilon), ReferenceEpsilon(**sizes, epsilon_ns=epsilon)
 
 

@@ -7,7 +7,7 @@ from itertools import combinations
 
 from syncrelay.config import GroupConfig, load_text
 from syncrelay.config.load import spelt_out
-from syncrelay.explain.nearest import PossibleSets
+from syncrelay.explain.nearest import LONGEST, PossibleSets
 from syncrelay.explain.trials import Trials
 from syncrelay.recordings.analysis.changes import Change, with_changes
 from syncrelay.recordings.analysis.curves import Curves, curves_of
@@ -62,7 +62,7 @@ class GroupAnalysis:
         """Which dropped messages cost no set."""
         if self.possible is None or not len(self.possible):
             return find_unneeded(self.group, self.evaluation, None)
-        slop = self.group.options.tolerance.ns if self.group.options.tolerance else 0
+        slop = self.group.options.tolerance.ns if self.group.options.tolerance else LONGEST
         return find_unneeded(self.group, self.evaluation, slop if self.possible.is_alone else self.possible.widest)
 
     @property

@@ -98,13 +98,15 @@ def fit(group: dict[str, Any]) -> None:
 def others(key: str, keys: dict[str, Any]) -> Iterator[Any]:
     """Yield other values of a key; None for the key left out."""
     match key, keys[key]:
+        case "slop", "none":
+            yield from ("1ms", "40ms")
         case (("slop" | "max_wait" | "max_age" | "offset" | "min_period"), value):
             yield from (f"{round(parse_duration(value) * share)}ns" for share in (-1, 0, 0.5, 0.9, 1.1, 2))
             yield None
         case "max_rate", value:
             yield from (f"{1e9 / parse_rate(value) * share} Hz" for share in (0.5, 0.8, 1.25, 2))
             yield None
-        case (("queue_size" | "every"), value):
+        case (("queue_size" | "every" | "quorum"), value):
             yield from (each for each in (1, value // 2, value - 1, value + 1, value * 2) if each > 0)
             yield None
         case "policy", value:

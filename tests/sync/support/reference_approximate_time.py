@@ -10,7 +10,7 @@ class ReferenceApproximateTime:
     def __init__(self, *, n_inputs, queue_size, slop_ns, age_penalty=0.1, min_periods_ns=None):
         self.inputs = range(n_inputs)
         self.queue_size = queue_size
-        self.slop = slop_ns
+        self.slop = float("inf") if slop_ns is None else slop_ns
         self.factor = Fraction(1.0 + age_penalty)
         self.bounds = min_periods_ns or [0] * n_inputs
         self.queues: list[list[Message]] = [[] for _ in self.inputs]

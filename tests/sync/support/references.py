@@ -86,7 +86,7 @@ class ReferenceExactTime(Queued):
 class ReferenceEager(Queued):
     def __init__(self, n_inputs, queue_size, slop_ns):
         super().__init__(n_inputs, queue_size)
-        self.slop = slop_ns
+        self.slop = float("inf") if slop_ns is None else slop_ns
 
     def take(self, message):
         if self.replace(message):
@@ -124,7 +124,7 @@ def span(members):
 class ReferenceEpsilon(Queued):
     def __init__(self, n_inputs, queue_size, epsilon_ns):
         super().__init__(n_inputs, queue_size)
-        self.epsilon = epsilon_ns
+        self.epsilon = float("inf") if epsilon_ns is None else epsilon_ns
 
     def take(self, message):
         if self.replace(message):
