@@ -12,6 +12,7 @@ from functools import partial
 from typing import NamedTuple
 
 from tests.bank.kinds import KINDS
+from tests.bank.mended import mended
 from tests.bank.play import Score, described, drawn, play
 
 
@@ -25,14 +26,18 @@ class Row(NamedTuple):
     cure: str
     is_cure_tried: bool
     lasted: float
+    after: tuple[Score, str] | None = None
+    """How the second fault was told once the first was mended."""
 
 
 def row(kinds: tuple[str, ...], n_faults: int, seed: int) -> Row:
     result = play(drawn(seed, kinds, n_faults))
+    then = mended(result.drawn, result)
     first = result.first[1].code.value if result.first else ""
     why = result.why or ("" if result.score is Score.TOLD else first)
     kind, tried = " + ".join(result.drawn.kinds) or "well", any(each.moments for each in result.drawn.truths)
-    return Row(seed, kind, result.score, why, result.cure or "", tried, result.lasted)
+    after = None if then is None else (then.result.score, then.why)
+    return Row(seed, kind, result.score, why, result.cure or "", tried, result.lasted, after)
 
 
 def main() -> int:
@@ -50,6 +55,10 @@ def main() -> int:
         result = play(draw)
         _say(described(draw), *(f"  {second:6.2f} {text}" for second, text in result.said))
         _say(f"{result.score.value} {result.why}; cure: {result.cure or 'well'}; logged at {result.logged}")
+        if (then := mended(draw, result)) is not None:
+            _say(f"{then.kind} mended at {then.at:.2f} s; then true: {then.result.drawn.truths[0]}")
+            _say(*(f"  {second:6.2f} {text}" for second, text in then.result.said))
+            _say(f"{then.result.score.value} {then.why}")
         return 0
     began = time.monotonic()
     with ProcessPoolExecutor(asked.jobs) as pool:
@@ -75,6 +84,17 @@ def _table(rows: list[Row]) -> None:
     wrong = [each for each in offered if each.cure]
     fails = "; ".join(f"{each.seed} {each.kind}: {each.cure}" for each in wrong[:12])
     _say(f"of {len(told)} that were told, {len(offered)} were offered a cure, which fails in {len(wrong)}. {fails}")
+    after = [each for each in rows if each.after is not None]
+    if after:
+        named = sum(score is Score.TOLD for score, _ in filter(None, (each.after for each in after)))
+        _say(f"of {len(after)} whose first fault was mended, the second was named in {named}")
+        _say(
+            *(
+                f"  {each.seed} {each.kind}: {each.after[0].value} {each.after[1]}"
+                for each in after
+                if each.after and each.after[0] is not Score.TOLD
+            )
+        )
     if rows[0].kind == "well":
         _say(f"longest false warning: {max(each.lasted for each in rows):.0f} s")
 

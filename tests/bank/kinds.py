@@ -339,9 +339,15 @@ def out_of_order(rig: Rig) -> Truth | None:
     flow = _one(rig)
     of = (rig.rng.random(len(flow.true)) < rig.chance.uniform(0.1, 0.4)) & flow.since(rig.begin)
     by = round(flow.period * rig.chance.uniform(1.3, 3))
+    # Before the first message that comes nothing is out of order.
+    of[: np.searchsorted(flow.true, round(flow.starts * S)) + 1] = False
     flow.received = flow.received + of * by
+    # Of so few messages, none may come late for a while.
+    late = np.sort(flow.received[of])
+    if len(late) < 3:
+        return None
     # Stamps that fall by more than a second have jumped, as they do in the engine.
-    return _truth("out_of_order" if by < S else "out_of_order time_jump", flow, rig.seen(periods=12))
+    return _truth("out_of_order" if by < S else "out_of_order time_jump", flow, max(rig.seen(), late[2] / S))
 
 
 @_kind(midway=0.5)
@@ -358,6 +364,8 @@ def two_publishers(rig: Rig) -> Truth | None:
         flow.lateness,
         flow.jitter,
         f"{flow.topic}_other",
+        starts=flow.starts,
+        found=flow.found,
     )
     other.keep(other.since(rig.begin))
     begin = rig.begin
@@ -423,7 +431,7 @@ def slowed(rig: Rig) -> Truth | None:
     flow.keep(~of | (np.arange(len(of)) % n == 0))
     return (
         _truth("slowed", flow, rig.begin + 12 * n * flow.period / S, (flow.hz / n,), unit="Hz")
-        if flow.hz * rig.begin > 40
+        if flow.hz * (rig.begin - flow.starts) > 40
         else None
     )
 

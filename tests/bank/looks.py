@@ -16,7 +16,7 @@ from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.findings import Finding
 from syncrelay.relay.relay import is_early
 from syncrelay.top.observed import unhealthy
-from tests.bank.play import Drawn, Score, fit, is_of_stall, publishers_of, sets_of
+from tests.bank.play import Drawn, Score, fit, is_of_rig, publishers_of, sets_of
 from tests.explain.scenario import run
 
 # Of few sets, one that is on its way at the end decides nothing.
@@ -90,7 +90,7 @@ def _looks(seconds: float) -> Iterator[float]:
 
 def names_the_cause(draw: Drawn, looked: Looked) -> bool | None:
     """Whether what is said first names a fault that was drawn; None where none could be seen by then."""
-    if is_of_stall(draw, looked.said, looked.second):
+    if is_of_rig(draw, looked.said, looked.second):
         return None
     scores = [fit(draw, each, looked.second, looked.said)[0] for each in draw.truths if each.seen <= looked.second]
     return bool({Score.TOLD, Score.LATE}.intersection(scores)) if scores else None

@@ -4,11 +4,11 @@ import contextlib
 import random
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from itertools import count
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from syncrelay.explain import Code, EngineDriver, Finding, GroupFacts, Severity,
 from syncrelay.explain.finding_log import Remark
 from syncrelay.sync import Match, Message
 from tests.bank.kinds import KINDS, Kind, Truth
-from tests.bank.rig import LONGEST_S, Flow, Rig, S, a_rig, spans
+from tests.bank.rig import LONGEST_S, Flow, Rig, S, a_rig, spans, without_what_was_before_the_start
 from tests.explain.scenario import BEGAN, Source, group_of, run
 
 IN_TIME_S: Final = 7.0
@@ -65,6 +65,8 @@ class Drawn:
     looks: list[float]
     well: Rig
     """The rig as it was before its faults."""
+    alone: tuple["Alone", ...] = ()
+    """Of several faults, each as it is without the others."""
 
     @property
     def sources(self) -> list[Source]:
@@ -85,9 +87,16 @@ class Drawn:
         return group_of(self.sources, self.rig.options)
 
 
+class Alone(NamedTuple):
+    """A rig with one of several faults, and what is true of it."""
+
+    rig: Rig
+    truth: Truth
+
+
 @dataclass
 class Result:
-    """What came of a draw: `first` is the first sentence that is neither well nor about a stall of the relay."""
+    """What came of a draw: `first` is the first sentence that is neither well nor of what else is true of the rig."""
 
     drawn: Drawn
     score: Score = Score.NOTHING
@@ -108,7 +117,7 @@ class Result:
         draw, text = self.drawn, _sentence(shown)
         if not self.said or self.said[-1][1] != text:
             self.said.append((second, text))
-        if shown.severity is Severity.OK or shown.code is Code.STARTING or is_of_stall(draw, shown, second):
+        if shown.severity is Severity.OK or shown.code is Code.STARTING or is_of_rig(draw, shown, second):
             return False
         self.lasted += 1.03
         self.first = self.first or (second, shown)
@@ -117,8 +126,8 @@ class Result:
             return False
         self.first = second, shown
         # What has only just begun may be less than it will be.
-        fits = [fit(draw, truth, second, shown) for truth in draw.truths if second < truth.seen]
-        return (Score.HALF, "size") not in fits
+        fits = [(fit(draw, truth, second, shown), second < truth.seen) for truth in draw.truths]
+        return ((Score.TOLD, ""), True) in fits or ((Score.HALF, "size"), True) not in fits
 
     @property
     def is_told(self) -> bool:
@@ -154,48 +163,79 @@ def drawn(
             began=began,
         )
         _stall(rig)
+        without_what_was_before_the_start(rig)
         return Drawn(seed, (), rig, (), _HEALTHY_S, _looks(chance, _HEALTHY_S), rig)
-    truths: tuple[Truth, ...] = ()
     for attempt in count():
         if not attempt % _ATTEMPTS:
             # Some kinds do not go together.
             names = tuple(chance.sample(list(kinds), min(n_faults, len(kinds))))
-        rig, well, truths = _faulty(chance, [KINDS[each] for each in names], midway, began)
-        if truths:
+        found = _faulty(chance, [KINDS[each] for each in names], midway, began)
+        if found is not None:
+            rig, well, truths, alone = found
             break
     if "stalls" not in names:
         _stall(rig)
     late = sum(end - begin for begin, end in rig.stops)
     truths = tuple(replace(each, seen=each.seen + late) for each in truths)
     seconds = max(each.seen for each in truths) + IN_TIME_S + _GRACE_S
-    return Drawn(seed, names, rig, truths, seconds, _looks(chance, seconds), well)
+    return Drawn(seed, names, rig, truths, seconds, _looks(chance, seconds), well, alone)
 
 
-def _faulty(
-    chance: random.Random, kinds: list[Kind], midway: tuple[float, float], began: int
-) -> tuple[Rig, Rig, tuple[Truth, ...]]:
-    """Return a rig with these faults, the rig without them, and what is true: nothing where one does no harm."""
+class _Faulty(NamedTuple):
+    """A rig with faults, the rig without them, what is true, and where there are several, each fault alone."""
+
+    rig: Rig
+    well: Rig
+    truths: tuple[Truth, ...]
+    alone: tuple[Alone, ...]
+
+
+def _faulty(chance: random.Random, kinds: list[Kind], midway: tuple[float, float], began: int) -> _Faulty | None:
+    """Return a rig with these faults; None where one does no harm, or is not what it would be without the others."""
     policies = [each for each in kinds[0].policies if all(each in of.policies for of in kinds)]
     if not policies:
-        rig = a_rig(chance, "approximate_time")
-        return rig, rig, ()
+        return None
     policy = chance.choice(policies)
-    rig = a_rig(chance, policy, same_rate=any(each.same_rate for each in kinds), began=began)
-    well = replace(rig, flows=[replace(each) for each in rig.flows], options=dict(rig.options))
-    truths = []
+    well = a_rig(chance, policy, same_rate=any(each.same_rate for each in kinds), began=began)
+    begins, seeds = [], []
     for kind in kinds:
-        if not all(len(each.true) for each in rig.flows):
-            # Of what does not come, nothing else can be seen.
-            return rig, well, ()
-        rig.begin = 0.0
-        if chance.random() < kind.midway:
-            first, last = midway
-            rig.begin = first + (last - first) * chance.random() + 8 * rig.slowest / S
-        truth = kind.draw(rig)
+        first, last = midway
+        is_midway = chance.random() < kind.midway
+        at = well.starts + first + (last - first) * chance.random() + 8 * well.slowest / S
+        begins.append(at if is_midway else 0.0)
+        seeds.append(chance.randrange(2**32))
+    rig, truths, alone = _copy(well), [], []
+    for draw in zip(kinds, begins, seeds, strict=True):
+        # Of what does not come, nothing else can be seen.
+        truth = _put_in(rig, *draw) if all(len(each.true) for each in rig.flows) else None
         if truth is None or truth.seen + IN_TIME_S > LONGEST_S - 5:
-            return rig, well, ()
+            return None
         truths.append(truth)
-    return rig, well, tuple(truths)
+        if len(kinds) > 1:
+            one = _copy(well)
+            is_true = _put_in(one, *draw)
+            # Of one clock that is off by two causes, what is seen is their sum.
+            if any("other_clock" in each.codes & truth.codes and each.topics & truth.topics for each in truths[:-1]):
+                return None
+            if is_true is None or (is_true.codes, is_true.topics) != (truth.codes, truth.topics):
+                return None
+            if any(one.options[key] not in (well.options[key], rig.options[key]) for key in well.options):
+                return None
+            alone.append(Alone(one, is_true))
+    for each in (rig, well, *(one.rig for one in alone)):
+        without_what_was_before_the_start(each)
+    return _Faulty(rig, well, tuple(truths), tuple(alone))
+
+
+def _copy(rig: Rig) -> Rig:
+    return replace(rig, flows=[replace(each) for each in rig.flows], options=dict(rig.options), stops=[*rig.stops])
+
+
+def _put_in(rig: Rig, kind: Kind, begin: float, seed: int) -> Truth | None:
+    """Change a rig by a fault, by chances of its own; what is there from the start shows once all sensors have."""
+    rig.begin, rig.chance = begin, random.Random(seed)
+    truth = kind.draw(rig)
+    return truth if truth is None or begin else replace(truth, seen=truth.seen + rig.starts)
 
 
 def _stall(rig: Rig) -> None:
@@ -219,12 +259,23 @@ class _HeardEnoughError(Exception):
 
 def play(draw: Drawn) -> Result:
     """Play a draw until its first sentence, or to its end."""
+    result = heard(draw, lambda facts, found: explanation(with_ok(facts, found)))
+    truth = result.judge()
+    if result.first is not None and result.is_told and truth is not None and truth.moments:
+        result.cure = _wrong_with_cure(draw, result.first[1])
+    return result
+
+
+def heard(draw: Drawn, chosen: Callable[[GroupFacts, tuple[Finding, ...]], Finding | None]) -> Result:
+    """Play a draw until the first sentence that can be judged, of those that are `chosen` at each look."""
     result = Result(draw)
 
     def hears(second: float, facts: GroupFacts, found: tuple[Finding, ...], remarks: list[Remark]) -> None:
-        shown = explanation(with_ok(facts, found))
         if result.logged is None and any(each.severity is not Severity.OK for each in remarks):
             result.logged = second
+        shown = chosen(facts, found)
+        if shown is None:
+            return
         awaits = facts.suggester is not None and facts.suggester.awaits((shown.code, shown.input))
         if result.hears(second, shown, is_open=awaits):
             raise _HeardEnoughError
@@ -239,9 +290,6 @@ def play(draw: Drawn) -> Result:
             looks=draw.looks,
             hears=hears,
         )
-    truth = result.judge()
-    if result.first is not None and result.is_told and truth is not None and truth.moments:
-        result.cure = _wrong_with_cure(draw, result.first[1])
     return result
 
 
@@ -249,7 +297,17 @@ def publishers_of(flows: Sequence[Flow]):
     by_topic = defaultdict(list)
     for each in flows:
         by_topic[each.topic].append(each)
-    return lambda topic, second: tuple(each.endpoint for each in by_topic[topic] if each.shown(second))
+    return lambda topic, second: tuple(each.endpoint for each in by_topic[topic] if each.is_shown(second))
+
+
+def is_of_rig(draw: Drawn, finding: Finding, second: float) -> bool:
+    """Whether a finding is of what is true of a rig beside its faults: that sensors are still to start, or a stall."""
+    topics = [topic.topic for topic in draw.config.topics]
+    if finding.code is Code.NO_PUBLISHER:
+        # The graph is looked at once a second.
+        late = {each.topic for each in draw.rig.flows if second < max(each.starts, each.found) + 1.1}
+        return {topics[index] for index in finding.about} <= late
+    return is_of_stall(draw, finding, second)
 
 
 def is_of_stall(draw: Drawn, finding: Finding, second: float) -> bool:
@@ -368,6 +426,10 @@ def sets_of(draw: Drawn, config: GroupConfig, since: float = 0.0, until: float =
     yield from given
 
 
+def _started(flow: Flow) -> str:
+    return f", starts at {flow.starts:.2f} s and is shown from {flow.found:.2f} s on" if flow.starts else ""
+
+
 def described(draw: Drawn) -> str:
     """Say what a draw is."""
     lines = [f"seed {draw.seed}: {' and '.join(draw.kinds) or 'well'}, from {draw.rig.begin:.1f} s; {draw.rig.options}"]
@@ -376,7 +438,8 @@ def described(draw: Drawn) -> str:
         first = ", ".join(f"{(stamp - draw.rig.began) / S:.6f}" for stamp in each.stamps[:3])
         lines.append(
             f"  {each.topic} at {each.hz:.3g} Hz, {each.lateness / 1e6:.3g} ms late, jitter {each.jitter / 1e6:.3g} ms"
-            f"{'' if each.required else ', optional'}; stamps {first} ... at {np.round(each.true[:1] / S, 6)}"
+            f"{'' if each.required else ', optional'}{_started(each)};"
+            f" stamps {first} ... at {np.round(each.true[:1] / S, 6)}"
         )
     lines += [f"  true: {each}" for each in draw.truths]
     return "\n".join(lines)

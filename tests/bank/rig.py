@@ -19,6 +19,10 @@ _TOPICS: Final = ("/camera", "/lidar", "/imu")
 # No matching needs the last of what comes so closely, and a draw should not take longer than a second of CPU.
 _MOST_HZ: Final = 1000.0
 _MOST_MESSAGES_A_SECOND: Final = 1500.0
+# Some sensors start after the relay, by up to so many seconds, and DDS shows them at some time around that.
+_START_LATE: Final = 0.3
+_LATEST_S: Final = 6.0
+_LEAD_S: Final = (-1.0, 3.0)
 
 
 @dataclass
@@ -36,6 +40,10 @@ class Flow:
     jitter: float
     node: str = ""
     required: bool = True
+    starts: float = 0.0
+    """When its first sample is taken: 0 if it was sending before the relay came."""
+    found: float = 0.0
+    """When the graph first shows its publisher."""
     is_cut: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     shown: Callable[[float], bool] = lambda _: True
     mismatch: Mismatch | None = None
@@ -53,6 +61,12 @@ class Flow:
     def keep(self, which: npt.NDArray[np.bool_]) -> None:
         """Lose all other messages."""
         self.true, self.stamps, self.received = self.true[which], self.stamps[which], self.received[which]
+        if len(self.is_cut):
+            self.is_cut = self.is_cut[which]
+
+    def is_shown(self, second: float) -> bool:
+        """Whether the graph shows its publisher."""
+        return second >= self.found and self.shown(second)
 
     def since(self, second: float) -> npt.NDArray[np.bool_]:
         """Which samples were taken from this second on."""
@@ -84,6 +98,11 @@ class Rig:
     began: int = BEGAN
     """Second 0 by the machine's clock."""
     stops: list[tuple[float, float]] = field(default_factory=list)
+
+    @property
+    def starts(self) -> float:
+        """When the last of its sensors has started."""
+        return max(each.starts for each in self.flows)
 
     @property
     def slowest(self) -> int:
@@ -158,7 +177,26 @@ def a_rig(
         for each in flows:
             each.keep(rng.random(len(each.true)) >= chance.uniform(0, 0.02))
     rig.options = _options(rig, policy)
+    _start(rig)
     return rig
+
+
+def _start(rig: Rig) -> None:
+    """Draw when the sensors start: before the relay, or after it, all at once or one by one."""
+    chance = rig.chance
+    if chance.random() >= _START_LATE:
+        return
+    at_once = chance.choice([None, chance.uniform(0, _LATEST_S)])
+    for each in rig.flows:
+        each.starts = chance.uniform(0, _LATEST_S) if at_once is None else at_once
+        each.found = max(0.0, each.starts - chance.choice([0.1, chance.uniform(*_LEAD_S)]))
+
+
+def without_what_was_before_the_start(rig: Rig) -> None:
+    """Have no sensor send before it has started."""
+    for each in rig.flows:
+        if each.starts:
+            each.keep(each.since(each.starts))
 
 
 def _flow(chance: random.Random, rng: np.random.Generator, topic: str, hz: float, true: Times, *, began: int) -> Flow:
