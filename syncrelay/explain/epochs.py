@@ -16,9 +16,12 @@ _SECOND: Final = 1_000_000_000
 BOOT_NS: Final = 365 * 86_400 * _SECOND
 """No machine runs for longer without a boot, nor has its clock been set before 1971."""
 # For each time scale: how close stamps must be, how far it is behind UTC, and its name. GPS time began in 1980 and has
-# no leap seconds; TAI has 37 more.
+# no leap seconds, of which there were 18 since; TAI has 37 more.
+_FROM_1980: Final = "GPS time, which counts from 1980"
+_GPS_EPOCH: Final = 315_964_800 * _SECOND
+_GPS_NEAR: Final = 30 * _SECOND
 _TIME_SCALES: Final = (
-    (30 * _SECOND, 315_964_800 * _SECOND, "GPS time, which counts from 1980"),
+    (_SECOND // 2, _GPS_EPOCH - 18 * _SECOND, _FROM_1980),
     (_SECOND // 2, -37 * _SECOND, "TAI, the time of PTP clocks, which is 37 s ahead of UTC"),
     (_SECOND // 2, -18 * _SECOND, "GPS time, which is 18 s ahead of UTC"),
 )
@@ -87,19 +90,25 @@ _PARTS: Final = (
 )
 
 
-def time_scale(newest: int, behind: int) -> tuple[str, int] | None:
-    """Recognize the time scale of stamps that are so far behind others: what they do, and how far that one is behind.
+class TimeScale(NamedTuple):
+    """A time scale: what stamps of it do, and how far they are behind, None where that differs from one to another."""
 
-    `newest` is the newest of these stamps.
-    """
+    what: str
+    behind: int | None
+
+
+def time_scale(newest: int, behind: int) -> TimeScale | None:
+    """Recognize the time scale of stamps that are so far behind others; `newest` is the newest of these stamps."""
     if 0 < newest < BOOT_NS and behind > BOOT_NS:
-        return _FROM_BOOT, behind
+        return TimeScale(_FROM_BOOT, None)
     for close, off, what in _TIME_SCALES:
         if abs(behind - off) < close:
-            return f"look like {what}", off
+            return TimeScale(f"look like {what}", off)
+    if abs(behind - _GPS_EPOCH) < _GPS_NEAR:
+        return TimeScale(f"look like {_FROM_1980}", None)
     zones, rest = divmod(abs(behind) + _ZONE // 2, _ZONE)
     if 0 < zones <= _MOST_ZONES and abs(rest - _ZONE // 2) < _SECOND:
-        return "look like local time, not UTC", zones * _ZONE if behind > 0 else -zones * _ZONE
+        return TimeScale("look like local time, not UTC", zones * _ZONE if behind > 0 else -zones * _ZONE)
     return None
 
 

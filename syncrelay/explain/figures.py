@@ -73,6 +73,8 @@ class InputFigures:
     """When they did."""
     stepped: Step | None = None
     """The last lasting step of its stamps against the times of receipt."""
+    delay_before: int | None = None
+    """The least delay of its messages before its clock was set, None where that was not seen."""
     may_step: bool = False
     """Whether its last stamps may have stepped, which is not known yet."""
     swings: int = 0

@@ -67,6 +67,7 @@ class InputObservation:
         self._newest: int | None = None
         self._fell: tuple[int, int] | None = None
         self._steps = StampSteps()
+        self._delay_before: int | None = None
         self._is_simulated = False
 
     def add(self, arrivals: Arrivals, *, by_clock: Callable[[int], int] | None = None) -> bool:
@@ -81,7 +82,7 @@ class InputObservation:
         was_simulated, self._is_simulated = self._is_simulated, by_clock is not None
         if (self._received and last < self._received[-1]) or was_simulated is not self._is_simulated:
             self._forget()
-            self._steps.forget()
+            self._forget_steps()
         if self._first is None or last < self._first:
             self._first = self._flows_since = received[0]
         elif self._flows_since is None or last < self._flows_since or self._is_silent_at(received[0]):
@@ -99,6 +100,7 @@ class InputObservation:
             self._follow_steps(received, delays, least, most)
         # Of two clocks in turn, each fall is followed by a rise: nothing begins anew.
         if fallen and not self._steps.swings(last)[0]:
+            self._delay_before = self._steps.least
             self._forget()
             self._steps.forget_clock()
         while self._faults and self._faults[0].at <= last - WINDOW_NS:
@@ -118,6 +120,9 @@ class InputObservation:
         """Look whether the clock was set. What was stamped before tells nothing of it now."""
         at = self._steps.add(received, delays, least, most, period=lambda: _median_period(self._received))
         if at is not None:
+            step, now = self._steps.last, self._steps.least
+            if step is not None and step.at == at and now is not None:
+                self._delay_before = now + step.by
             old = sum(stamp + delay < at for stamp, delay in zip(self._stamps, self._delays, strict=True))
             del self._stamps[:old], self._delays[:old]
             self._forget_drift()
@@ -134,7 +139,7 @@ class InputObservation:
         """Bear that others publish now than did: their rate and their clocks are not those of before."""
         self._pace.forget()
         del self._paced[:]
-        self._steps.forget()
+        self._forget_steps()
         self.forget_clock()
 
     def forget_clock(self) -> None:
@@ -142,6 +147,10 @@ class InputObservation:
         del self._stamps[:], self._delays[:]
         self._forget_drift()
         self._steps.forget_levels()
+
+    def _forget_steps(self) -> None:
+        self._steps.forget()
+        self._delay_before = None
 
     def _forget_drift(self) -> None:
         self._points.clear()
@@ -203,6 +212,7 @@ class InputObservation:
             fell_at=fell_at,
             least_delay=self._steps.least,
             stepped=self._steps.last,
+            delay_before=self._delay_before,
             may_step=may_step,
             swings=swings,
             swung_by=swung_by,

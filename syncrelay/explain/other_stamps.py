@@ -7,23 +7,34 @@ from typing import Any, Final
 import numpy as np
 
 from syncrelay.clock import MOST_RATE, DeviceClock, Step, host_times
+from syncrelay.config.units import parse_duration
 from syncrelay.explain.changes import Change, Changes, changed
 from syncrelay.explain.codes import Code
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.figures import InputFigures
 from syncrelay.explain.findings import written
-from syncrelay.explain.nearest import Nanoseconds, in_order, period_of, quantile, shifted, sides
-from syncrelay.explain.trials import REQUIRED, Trials, Tried, Verdict
+from syncrelay.explain.nearest import Nanoseconds, period_of, quantile, shifted, sides
+from syncrelay.explain.pairing import is_certain
+from syncrelay.explain.trials import REQUIRED, UNTRIED, Trials, Tried, Verdict
+from syncrelay.explain.widths import with_headroom
 from syncrelay.sync import Message
 
 # A clock that is set more often, beside a few times at first, is no clock that can be mapped: it has another rate.
 _FEW_STEPS: Final = 2
 _SET_EVERY: Final = 30_000_000_000
 _FEWEST: Final = 5
+# What took longer before the clock was set was of another clock then.
+_LONGEST_DELAY: Final = 1_000_000_000
+# Results may come this late. They can be told from another clock by messages of so much of the time that they take.
+_LATENCY: Final = 10_000_000_000
+_OLD: Final = 0.5
+# Mapped stamps are off by up to this share of the usual jitter.
+_ACCURATE: Final = 0.1
 # A part of a delay that is less is not worth a key, and no device is known to keep it.
 _TENTH_OF_A_MS: Final = 100_000
-# Spans near the tolerance are over it when two devices have run a little apart: there may be something better.
-_ROOM: Final = 0.8
+# Spans near the tolerance are over it when two devices have run a little apart: there may be something better. If
+# there is not, so many have to show that hardly any is over it.
+_MANY: Final = 20
 # What wanders by less is not why sets are missing: a share of the tolerance, and what drivers take.
 _MATTERS: Final = 0.5
 _LEAST_DISTANCE: Final = 1_000_000
@@ -32,32 +43,67 @@ _BENDS: Final = 8
 
 
 def by_other_stamps(
-    trials: Trials, index: int, target: int | None = REQUIRED, *, keys: Collection[str] = ("clock", "stamp")
-) -> Tried | None:
-    """Return what mapping an input's stamps gives, or else its times of receipt; None of what does not bring the sets.
+    trials: Trials,
+    index: int,
+    target: int | None = REQUIRED,
+    *,
+    keys: Collection[str] = ("clock", "stamp"),
+    delay: int | None = None,
+) -> Verdict:
+    """Return what mapping an input's stamps gives, or else its times of receipt; nothing of what brings no sets.
 
-    The mapping begins with the messages that it is tried on, and what that costs is counted. Of the least delay, which
-    it cannot know, it is also tried to take off as much as the mapped stamps lie behind those of the others.
+    The mapping begins with the messages that it is tried on, and what that costs is counted. The least delay, which it
+    cannot know, is the one that was seen before the clock was set, `delay`. Else it is also tried to take off as much
+    as the mapped stamps lie behind those of the others; it is open where it decides which messages belong together.
     """
-    found: Tried | None = _once(trials, (index, target, *keys), lambda: _tried(trials, index, target, keys))
+    found: Verdict = _once(trials, (index, target, *keys, delay), lambda: _tried(trials, index, target, keys, delay))
     return found
+
+
+def _may_be_old(trials: Trials, index: int) -> bool:
+    """Whether stamps that seem to be of another clock may be as old as they say, and no message is that old.
+
+    A longer queue cannot be tried then: which of the two it is, nothing shows.
+    """
+    apart, received = trials.apart(index), [each.received for each in trials.inputs if len(each.received)]
+    watched = min((int(each[-1] - each[0]) for each in received), default=0)
+    return trials.is_window and _OLD * watched < apart < _LATENCY
+
+
+def by_offset_of_clock(trials: Trials, index: int, change: Change, target: int | None = REQUIRED) -> Tried | None:
+    """Return what an offset for an input of another clock gives; None where nothing shows what belongs together."""
+    is_exact = trials.exactly_apart(index) is not None
+    is_known = is_exact or (not _may_be_old(trials, index) and is_certain(trials.moved(change), index, target))
+    return trials.by_offset(change, target) if is_known else None
 
 
 def offered_stamps(facts: GroupFacts, code: Code, index: int) -> str:
     """Say to have an input's stamps mapped, or to go by receipt, and what that gives; nothing if it does not help."""
     if facts.suggester is None:
         return ""
-    keys = ("clock", "stamp") if _can_be_followed(facts.inputs[index].figures) else ("stamp",)
+    figures, name = facts.inputs[index].figures, facts.inputs[index].name
+    keys = ("clock", "stamp") if _can_be_followed(figures) else ("stamp",)
 
     def question(trials: Trials) -> Verdict:
-        tried = by_other_stamps(trials, index, keys=keys)
-        return Verdict(() if tried is None else (tried,))
+        return by_other_stamps(trials, index, keys=keys, delay=figures.delay_before)
 
-    found = facts.suggester.ask((code, index, *keys), question, now=facts.figures.now).tried
-    if not found:
+    verdict = facts.suggester.ask((code, index, *keys), question, now=facts.figures.now)
+    if verdict.is_open:
+        return f"; {if_delay_is_known(name)}"
+    if not verdict.tried:
         return ""
-    gives = f"which would give {found[0].given} of {found[0].possible} possible sets"
-    return f", or write {written(facts, found[0].changes)}, {gives}"
+    (found,) = verdict.tried
+    return (
+        f", or write {written(facts, found.changes)}, which would give {found.given} of {found.possible} possible sets"
+    )
+
+
+def if_delay_is_known(name: str) -> str:
+    """Say what to do about an input whose least delay decides what its messages match."""
+    return (
+        f"if you know how long messages of {name} take at least to arrive, which decides what they match, map its"
+        " stamps with the keys `clock` and `delay`"
+    )
 
 
 def wandering(trials: Trials, index: int) -> int:
@@ -87,39 +133,68 @@ def _can_be_followed(figures: InputFigures) -> bool:
     return not is_line or drift is None or abs(drift.slope) <= max(MOST_RATE, drift.doubt)
 
 
-def _tried(trials: Trials, index: int, target: int | None, keys: Collection[str]) -> Tried | None:
+def _tried(trials: Trials, index: int, target: int | None, keys: Collection[str], delay: int | None) -> Verdict:
     config = trials.config
     topic, tolerance = config.topics[index], config.options.tolerance
     needs_equal = tolerance is not None and not tolerance.takes_times_of_arrival
     if topic.is_of_device or topic.stamp == "receive" or needs_equal:
-        return None
-    narrow = None
-    for moved, changes in _attempts(trials, index, target, keys):
+        return UNTRIED
+    # What runs at another rate is of another clock.
+    if "clock" in keys and _may_be_old(trials, index):
+        return UNTRIED
+    narrow, is_open = None, False
+    for moved, changes, is_known in _attempts(trials, index, target, keys, delay):
         if narrow is not None and changes[0].key == "stamp":
             break
-        if moved.is_enough((), target):
-            tried = Tried(changes, moved.given((), target), trials.given((), target), len(moved.spans(target)))
-            if tolerance is None or quantile(moved.spans(target), 0.95) <= _ROOM * tolerance.ns:
-                return tried
-            narrow = narrow or tried
-    return narrow
+        if not moved.is_enough((), target) or (changes[0].key == "clock" and _is_rough(moved, index)):
+            continue
+        if not is_known and not is_certain(moved, index, target):
+            is_open |= changes[0].key == "clock"
+            continue
+        tried = Tried(changes, moved.given((), target), trials.given((), target), len(moved.spans(target)))
+        if is_known or tolerance is None or parse_duration(with_headroom(moved.spans(target))) <= tolerance.ns:
+            return Verdict((tried,))
+        narrow = narrow or (tried if len(moved.spans(target)) >= _MANY else None)
+    return Verdict((narrow,)) if narrow else Verdict((), is_open=is_open)
 
 
 def _attempts(
-    trials: Trials, index: int, target: int | None, keys: Collection[str]
-) -> Iterator[tuple[Trials, Changes]]:
-    """Yield trials with other stamps of an input's messages, and what to write for them."""
+    trials: Trials, index: int, target: int | None, keys: Collection[str], delay: int | None
+) -> Iterator[tuple[Trials, Changes, bool]]:
+    """Yield trials with other stamps of an input's messages, what to write for them, and if the delay is known."""
     is_mapped = "clock" in keys and not trials.config.inputs.node.use_sim_time
     if is_mapped and (mapped := _mapped(trials, index)) is not None:
         device: Changes = (Change("clock", "device", index),)
         at_once = _with_stamps(trials, index, mapped, device)
-        yield at_once, device
-        for late in _lateness(at_once, index, target):
-            changes = (*device, Change("delay", f"{late / 1_000_000:g}ms", index))
-            yield _with_stamps(trials, index, mapped - late * at_once.inputs[index].are_stamped, changes), changes
+        known = [] if delay is None or not 0 <= delay < _LONGEST_DELAY else [_in_tenths(delay)]
+        late = [(each, True) for each in known] or [
+            (0, False),
+            *((each, False) for each in _lateness(at_once, index, target)),
+        ]
+        for by, is_known in late:
+            changes = (*device, Change("delay", f"{by / 1_000_000:g}ms", index)) if by else device
+            yield (
+                _with_stamps(trials, index, mapped - by * at_once.inputs[index].are_stamped, changes),
+                changes,
+                is_known,
+            )
     if "stamp" in keys:
         by_receipt: Changes = (Change("stamp", "receive", index),)
-        yield _with_stamps(trials, index, trials.inputs[index].received, by_receipt), by_receipt
+        yield _with_stamps(trials, index, trials.inputs[index].received, by_receipt), by_receipt, False
+
+
+def _in_tenths(delay: int) -> int:
+    return delay // _TENTH_OF_A_MS * _TENTH_OF_A_MS
+
+
+def _is_rough(mapped: Trials, index: int) -> bool:
+    """Whether messages are late by so much more than the tolerance that their mapped stamps are no nearer than that."""
+    tolerance, messages = mapped.config.options.tolerance, mapped.inputs[index]
+    is_set = messages.are_stamped
+    if tolerance is None or not is_set.any():
+        return False
+    delays = messages.received[is_set] - messages.stamps[is_set]
+    return bool(_ACCURATE * (np.mean(delays) - np.min(delays)) > tolerance.ns)
 
 
 def _once(trials: Trials, about: Hashable, find: Callable[[], Any]) -> Any:
@@ -174,14 +249,14 @@ def _lateness(moved: Trials, index: int, target: int | None) -> Iterator[int]:
     if possible is None or len(possible.among) < 2:  # noqa: PLR2004  one alone is beside nothing
         return
     other = possible.pivot if possible.pivot != index else next(each for each in possible.among if each != index)
-    own, others = (in_order(moved.inputs[at], moved.config.topics[at].offset_ns).stamps for at in (index, other))
+    own, others = moved.stamps(index), moved.stamps(other)
     is_pivot = possible.pivot == index
     late = sides(own, others).before if is_pivot else sides(others, own).after
     # What the mapping did at first, before it had settled, tells nothing.
     late = late[len(late) // 2 :]
     if len(late) < _FEWEST:
         return
-    usual = quantile(late, 0.5) // _TENTH_OF_A_MS * _TENTH_OF_A_MS
+    usual = _in_tenths(quantile(late, 0.5))
     # Stamps that are little before the nearest are not late by nearly a period.
     is_early = 2 * usual > period_of(others if is_pivot else own) and moved.is_enough((), target)
     if usual and not is_early and 2 * (quantile(late, 0.9) - quantile(late, 0.1)) <= usual:

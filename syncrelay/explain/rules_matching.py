@@ -16,11 +16,11 @@ from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Fault, Found, absence, counted, nodes, written
 from syncrelay.explain.nearest import quantile, shifted, signed_distances
-from syncrelay.explain.other_stamps import by_other_stamps
+from syncrelay.explain.other_stamps import by_offset_of_clock, by_other_stamps, wandering
 from syncrelay.explain.rules_flow import fates
 from syncrelay.explain.rules_stamps import offered_offset, other_clock
 from syncrelay.explain.standing import Standing
-from syncrelay.explain.trials import REQUIRED, UNTRIED, Trials, Verdict
+from syncrelay.explain.trials import REQUIRED, UNTRIED, Trials, Tried, Verdict
 from syncrelay.sync.messages import DropReason
 
 # Sets are too wide if this share of the slowest input's messages has no set, and at least this many were measured.
@@ -143,6 +143,10 @@ def _wide_enough(
     facts: GroupFacts, tolerance: Tolerance, nearest: Distribution, trials: Trials, target: int | None = REQUIRED
 ) -> Verdict:
     """Find a wider tolerance and constant offsets that help."""
+    for index in trials.required if target is REQUIRED else (target,):
+        # What a clock wanders by, no tolerance holds for.
+        if wandering(trials, index) and (mapped := by_other_stamps(trials, index, target, keys=["clock"])).tried:
+            return mapped
     tried = trials.verdict(target, {tolerance.key, "policy", "queue_size"})
     wider = [parse_duration(each.value) for one in tried.tried for each in one.changes if each.key == tolerance.key]
     # What is far apart although others are near has no partner: a wider slop would pair what does not belong together.
@@ -302,8 +306,8 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
 def _in_time(index: int, trials: Trials) -> Verdict:
     """Find an offset for an optional input of another clock, or other stamps."""
     offset = trials.clock_offset(index)
-    tried = (None if offset is None else trials.by_offset(offset, index)) or by_other_stamps(trials, index, index)
-    return Verdict(() if tried is None else (tried,))
+    tried = None if offset is None else by_offset_of_clock(trials, index, offset, index)
+    return by_other_stamps(trials, index, index) if tried is None else Verdict((tried,))
 
 
 def _away(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str] | None:
@@ -393,10 +397,15 @@ def _advice(facts: GroupFacts, verdict: Verdict, optional: str | None = None) ->
     first, *others = verdict.tried
     gives = f"which would give {first.given} of {first.possible} {sets} (now {first.now})"
     more = "".join(
-        f", or, if both are measured at the same time, {written(facts, each.changes)}, which would give {each.given}"
-        for each in others
+        f", or, {_condition(each)}{written(facts, each.changes)}, which would give {each.given}" for each in others
     )
-    return f"write {written(facts, first.changes)}, {gives}{more}"
+    return f"{_condition(first)}write {written(facts, first.changes)}, {gives}{more}"
+
+
+def _condition(tried: Tried) -> str:
+    """Say under which condition a value is right: a small offset says that messages are of one moment."""
+    is_small = any(each.key == "offset" and abs(parse_duration(each.value)) < SECOND for each in tried.changes)
+    return "if both are measured at the same time, " if is_small else ""
 
 
 def _or(advice: str | None) -> str:

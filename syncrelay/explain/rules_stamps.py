@@ -10,15 +10,15 @@ from syncrelay.explain import words
 from syncrelay.explain.changes import offset_change
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import Distribution
-from syncrelay.explain.epochs import BOOT_NS, time_scale
+from syncrelay.explain.epochs import time_scale
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.figures import InputFigures
-from syncrelay.explain.findings import SECOND, Fault, Found, blocks, counted, nodes
-from syncrelay.explain.other_stamps import offered_stamps
+from syncrelay.explain.findings import SECOND, Fault, Found, blocks, counted, nodes, written
+from syncrelay.explain.other_stamps import by_offset_of_clock, offered_stamps
 from syncrelay.explain.rules_flow import waited_for_relay
 from syncrelay.explain.standing import Standing
 from syncrelay.explain.steps import STEP_NS
-from syncrelay.explain.trials import REQUIRED, Trials, Verdict
+from syncrelay.explain.trials import REQUIRED, UNTRIED, Trials, Verdict
 from syncrelay.sync.messages import DropReason
 
 # Stamps further off than this come from another clock, or are older than a queue should hold.
@@ -120,9 +120,8 @@ def other_clock(facts: GroupFacts) -> Found:
     shifted = f", with its offset of {words.exactly(offset)}," if offset else ""
     newest = an_input.figures.stamps[-1] if an_input.figures.stamps else 0
     if scale := time_scale(newest, behind):
-        what, exactly = scale
-        text = f"stamps of {an_input.name}{shifted} {apart_by}: they {what}"
-        exact = None if abs(behind) > BOOT_NS else exactly + offset
+        text = f"stamps of {an_input.name}{shifted} {apart_by}: they {scale.what}"
+        exact = None if scale.behind is None else scale.behind + offset
         suggestion = f"have {nodes(an_input)} stamp with the host's time{_or_mapped(facts, odd, exact)}"
     else:
         text = f"stamps of {an_input.name}{shifted} {apart_by}"
@@ -173,11 +172,14 @@ def offered_offset(facts: GroupFacts, code: Code, index: int, by: int) -> str:
         return f"write `offset: {words.exactly(by)}` at {name}"
 
     def question(trials: Trials) -> Verdict:
-        near = by_clock if code is Code.OTHER_CLOCK and (by_clock := trials.clock_offset(index)) else None
+        near = trials.clock_offset(index) if code is Code.OTHER_CLOCK else None
         near = near or next((each for each in trials.offsets() if each.input == index), None)
         if near is None or abs(parse_duration(near.value) - by) > _SAME_OFFSET * abs(by):
             near = offset_change(index, by)
-        tried = None if near is None else trials.by_offset(near)
+        if near is None:
+            return UNTRIED
+        by_clock = code is Code.OTHER_CLOCK
+        tried = by_offset_of_clock(trials, index, near) if by_clock else trials.by_offset(near)
         return Verdict(() if tried is None else (tried,))
 
     found = facts.suggester.ask((code, index), question, now=facts.figures.now).tried
@@ -203,15 +205,13 @@ def _wait_for_it(facts: GroupFacts, index: int, behind: int) -> str:
     """Offer a longer queue, if one was tried and helps: stamps that seem old may be of results that take long."""
     if facts.suggester is None or not 0 < behind < _LATENCY:
         return ""
-    about = (Code.OTHER_CLOCK, index, "queue_size")
-    longer = facts.suggester.ask(about, lambda trials: trials.verdict(REQUIRED, {"queue_size"}), now=facts.figures.now)
-    found = longer.tried
+    about, keys = (Code.OTHER_CLOCK, index, "queue_size"), {"queue_size", "policy"}
+    found = facts.suggester.ask(about, lambda trials: trials.verdict(REQUIRED, keys), now=facts.figures.now).tried
     if not found:
         return ""
-    (change,) = found[0].changes
     return (
-        f"; if {facts.inputs[index].name} really takes that long to arrive, write `{change.key}: {change.value}`, which"
-        f" would give {found[0].given} of {found[0].possible} possible sets"
+        f"; if {facts.inputs[index].name} really takes that long to arrive, write {written(facts, found[0].changes)},"
+        f" which would give {found[0].given} of {found[0].possible} possible sets"
     )
 
 
@@ -315,7 +315,7 @@ def _ago(now: int, at: int) -> str:
     return f"{words.seconds(max(0, now - at))} ago"
 
 
-def time_jump(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
+def time_jump(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find that stamps fell back; without blame, unless they do so again and again."""
     now, figures = facts.figures.now, an_input.figures
     if figures.reading is not None:
@@ -330,7 +330,8 @@ def time_jump(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
         yield Fault(
             f"timestamps of {an_input.name} jumped back {words.span_of_time(figures.fell_by)},"
             f" {_ago(now, figures.fell_at)}; matching restarted",
-            "a looped recording does this, or a clock that was reset",
+            "a looped recording does this, or a clock that was reset"
+            + (offered_stamps(facts, Code.TIME_JUMP, index) if facts.has_stopped else ""),
             Severity.OK,
             explains=False,
         )

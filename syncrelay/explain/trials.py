@@ -32,6 +32,7 @@ from syncrelay.explain.nearest import (
     shifted,
     signed_distances,
 )
+from syncrelay.explain.widths import are_amid, tolerances, wander, with_headroom
 from syncrelay.sync import Match, Message, Outcome
 from syncrelay.sync.queues import LONGEST_QUEUE
 
@@ -65,10 +66,14 @@ class Tried:
 
 
 class Verdict(NamedTuple):
-    """The values that help, if any; and whether the file's values may miss sets at all."""
+    """The values that help, if any; and whether the file's values may miss sets at all.
+
+    It is open where values give sets, and nothing shows which messages belong together.
+    """
 
     tried: tuple[Tried, ...]
     may_miss: bool = True
+    is_open: bool = False
 
 
 UNTRIED: Final = Verdict(())
@@ -245,7 +250,7 @@ class Trials:
         if tolerance is not None and quantile(possible.spans, 0.99) > tolerance.ns and not self.pairs_neighbours:
             policies: list[Changes] = [(Change("policy", tolerance.wider_policy),)] if tolerance.wider_policy else [()]
             # With headroom, some sets may lose messages to those that are nearly as near.
-            for wider in dict.fromkeys((with_headroom(possible.spans), words.at_least(possible.widest))):
+            for wider in self._tolerances(possible):
                 yield from ((*policy, Change(tolerance.key, wider)) for policy in (*policies, *patient))
         if target is not REQUIRED and (late := self._lateness(target)) > 0:
             yield from _waits(late, 2 * late)
@@ -253,6 +258,13 @@ class Trials:
         if target is REQUIRED:
             yield from patient
             yield from _waits(2 * options.max_wait, 4 * options.max_wait) if options.max_wait else ()
+
+    def _tolerances(self, possible: PossibleSets) -> Sequence[str]:
+        return tolerances(possible, [self.stamps(each) for each in possible.among], self.config.options.distance)
+
+    def stamps(self, index: int) -> Nanoseconds:
+        """Return an input's distinct stamps in order, offset added."""
+        return in_order(self.inputs[index], self.config.topics[index].offset_ns).stamps
 
     def _exact(self) -> Iterator[Changes]:
         is_by_stamp = all(topic.stamp != "receive" for topic in self.config.topics)
@@ -272,8 +284,8 @@ class Trials:
         if possible.is_exact:
             tidier = next(self._exact(), ()) if tolerance.ns else ()
         elif tolerance.ns > _TOO_WIDE * possible.widest and self.config.options.distance is Distance.SPAN:
-            targets = (REQUIRED, *(index for index in self.optional if len(self.spans(index))))
-            widest = max(parse_duration(with_headroom(self.spans(target))) for target in targets)
+            wide = [self._tolerances(each) for each in map(self.possible, (REQUIRED, *self.optional)) if each]
+            widest = max(parse_duration(each[0]) for each in wide) if all(wide) else tolerance.ns
             tidier = (Change(tolerance.key, words.at_least(widest)),) if widest < tolerance.ns else ()
         else:
             tidier = ()
@@ -355,7 +367,7 @@ class Trials:
         for index in possible.among:
             if index == pivot:
                 continue
-            one, other = (in_order(self.inputs[at], self.config.topics[at].offset_ns).stamps for at in (pivot, index))
+            one, other = self.stamps(pivot), self.stamps(index)
             distances = signed_distances(one, other)
             period = period_of(other)
             if len(distances) < _FEWEST or not period:
@@ -368,15 +380,21 @@ class Trials:
             whole = round((delays[0] - delays[1] + middle) / period) * period
             is_whole = bool(whole) and abs(delays[0] - delays[1] + middle - whole) <= _SAME * period
             shift = whole - middle if is_whole else -middle
+            if not is_whole and (are_amid(one, other) or wander(one, other).in_a_minute > abs(middle) / 2):
+                continue
             # Of two, the one that is farther from this machine's time is odd.
             at, shift = (index, shift) if abs(delays[0]) >= abs(delays[1]) else (pivot, -shift)
             is_same_rate = abs(float(np.median(np.diff(one))) / period - 1) <= _SAME_RATE
             if (change := offset_change(at, round(self.config.topics[at].offset_ns + shift))) is not None:
                 yield change, is_whole and is_same_rate
 
+    def moved(self, change: Change) -> "Trials":
+        """Return trials of the same messages with another offset."""
+        return replace(self, config=changed(self.config, (change,)), _targets={}, _runs={})
+
     def by_offset(self, change: Change, target: int | None = REQUIRED) -> Tried | None:
         """Return what another offset gives if it brings messages together that are possible sets by then, else None."""
-        moved = replace(self, config=changed(self.config, (change,)), _targets={}, _runs={})
+        moved = self.moved(change)
         if not moved.is_enough((), target):
             return None
         return Tried((change,), moved.given((), target), self.given((), target), len(moved.spans(target)))
@@ -386,8 +404,13 @@ class Trials:
         by = self.apart(index)
         if not by:
             return None
-        scale = time_scale(int(self.inputs[index].stamps[-1]), by)
-        return offset_change(index, (by if scale is None else scale[1]) + self.config.topics[index].offset_ns)
+        exact = self.exactly_apart(index)
+        return offset_change(index, (by if exact is None else exact) + self.config.topics[index].offset_ns)
+
+    def exactly_apart(self, index: int) -> int | None:
+        """Return by how much an input is behind the others if that is known by its time scale, else None."""
+        scale = time_scale(int(self.inputs[index].stamps[-1]), self.apart(index))
+        return None if scale is None else scale.behind
 
     def apart(self, index: int) -> int:
         """Return how much later after its stamp an input's message comes than the required ones' do; 0 if unknown."""
@@ -402,9 +425,3 @@ class Trials:
 
 def _waits(*each: int) -> Iterator[Changes]:
     yield from ((Change("max_wait", words.at_least(wait)),) for wait in each if wait <= LONGEST)
-
-
-def with_headroom(spans: Nanoseconds) -> str:
-    """Return the duration, as it stands in the file, that 99 % of spans keep to, and half of what they scatter by."""
-    most = quantile(spans, 0.99)
-    return words.at_least(most + (most - quantile(spans, 0.5)) // 2)

@@ -10,9 +10,10 @@ from syncrelay.config.units import parse_duration
 from syncrelay.config.wording import all_of
 from syncrelay.explain import words
 from syncrelay.explain.changes import Change as TriedChange
+from syncrelay.explain.changes import Changes
 from syncrelay.explain.epochs import BOOT_NS
 from syncrelay.explain.nearest import Received, quantile
-from syncrelay.explain.other_stamps import by_other_stamps, wandering
+from syncrelay.explain.other_stamps import by_offset_of_clock, by_other_stamps, if_delay_is_known, wandering
 from syncrelay.explain.trials import Trials
 from syncrelay.recordings.analysis.changes import Change
 from syncrelay.recordings.analysis.evaluation import Evaluation, evaluate
@@ -91,7 +92,10 @@ def _suggested(
             reason = f"sets leave {words.duration(_latency(slow) - _latency(quick))} sooner"
             changes += [replace(each, reason=reason) for each in sooner]
             then = max(then, trials_of(changed(changes), streams).given(()))
-    hints = tuple(_hint(trials.config, possible.pivot, each) for each in trials.offsets())
+    hints = (
+        *(_hint(trials.config, possible.pivot, each) for each in trials.offsets()),
+        *(if_delay_is_known(each.topic) for at, each in enumerate(trials.config.topics) if _is_open(trials, at)),
+    )
     return Suggestion(tuple(changes), hints, len(possible), now, then)
 
 
@@ -137,14 +141,23 @@ def _stamping(group: GroupConfig, streams: Sequence[Stream], trials: Trials) -> 
             reason = f"its clock went {words.duration(wandered)} off the host's time in the recording"
         if not reason:
             continue
-        offsets = (offset,) if offset is not None and is_off else ()
+        changes: Changes = (offset,) if offset is not None and is_off else ()
         # What counts from boot has another offset after the next.
-        is_constant = any(map(trials.by_offset, offsets)) and apart <= BOOT_NS
-        mapped = None if is_constant else by_other_stamps(trials, index, keys=["clock"])
-        changes = mapped.changes if mapped else offsets
+        is_constant = apart <= BOOT_NS or trials.exactly_apart(index) is not None
+        if not (is_constant and any(by_offset_of_clock(trials, index, each) for each in changes)):
+            verdict = by_other_stamps(trials, index, keys=["clock"])
+            if verdict.is_open:
+                continue
+            changes = verdict.tried[0].changes if verdict.tried else changes
         for each in changes:
             why = "mapped stamps are later than the others' by that" if each.key == "delay" else reason
             yield Change(group.name, index, each.key, each.value, why)
+
+
+def _is_open(trials: Trials, index: int) -> bool:
+    """Whether an input would be mapped, but its least delay decides what its messages match."""
+    is_off = abs(trials.apart(index)) > _SECOND or (not trials.is_enough(()) and wandering(trials, index))
+    return bool(is_off) and by_other_stamps(trials, index, keys=["clock"]).is_open
 
 
 def _by_arrival(group: GroupConfig, reason: str) -> Iterator[Change]:
