@@ -40,7 +40,14 @@ class DropReason(Enum):
         member.meaning, member.explanation = meaning, explanation
         return member
 
-    LATE = ("late", "older than the last set", "It is older than the last message of its input that went into a set.")
+    LATE = (
+        "late",
+        "older than the last set",
+        (
+            "It is older than the last message of its input that went into a set, or, with a `quorum`, than the message"
+            " that the last set was made round."
+        ),
+    )
     DUPLICATE = ("duplicate", "its stamp came twice", "A later message of the same stamp replaced it.")
     OVERFLOW = (
         "overflow",
@@ -53,14 +60,17 @@ class DropReason(Enum):
     SUPERSEDED = (
         "superseded",
         "a newer set left",
-        "A newer message of its input, one that fits better, went into a set.",
+        (
+            "A newer message of its input, one that fits better, went into a set; or a newer set left, and its own"
+            " still lacked inputs of its `quorum`."
+        ),
     )
     TOO_FAR = (
         "too_far",
         "no partner near enough",
         (
-            "Nothing within slop (for a trigger: within `max_age`) could still come: mostly what a fast topic sends"
-            " between two messages of a slow one."
+            "Nothing within slop (for a trigger: within `max_age`) could still come, or too little for a `quorum`:"
+            " mostly what a fast topic sends between two messages of a slow one."
         ),
     )
     EXPIRED = ("expired", "waited too long", "It waited, or aged, longer than allowed.")

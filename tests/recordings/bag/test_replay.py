@@ -139,3 +139,16 @@ def test_only_what_a_header_can_hold_restamps_a_set(stamp, tmp_path):
         assert (0, DropReason.MALFORMED) in _drops(left)
     else:
         assert _sets(left) == [(BEGIN, BEGIN)]
+
+
+def test_a_topic_that_is_not_in_the_recording_is_no_loss_to_a_quorum_of_the_others(tmp_path):
+    group = _group(inputs({"/radar": VECTOR, **_PAIR}), quorum=2, max_wait="50ms")
+    recording = write_mcap(tmp_path / "drive.mcap", rig(10))
+    left, result = _replayed(recording, group)
+    assert [stamps[0] for stamps in _sets(left)] == [None] * 10
+    assert result.sets == 10
+    for quorum, is_complete in ((2, True), (None, False)):
+        keys = {} if quorum is None else {"quorum": quorum, "max_wait": "50ms"}
+        text = config({"front": _group(inputs({"/radar": VECTOR, **_PAIR}), **keys)})
+        with bound(recording, text=text) as (_, (binding,)):
+            assert binding.is_complete is is_complete
