@@ -6,7 +6,7 @@ said and suggests nothing, while its cause holds and until the messages of that 
 
 - An explained finding explains others all the same: a relay that stood still explains an input that seems slow, and so
   the wide spans that such an input explains.
-- A finding about an optional input explains others about this input only.
+- A finding about an optional input explains others about this input only, unless its stamps jump back and forth.
 - A finding whose `explains` is False is too small to explain others.
 - If all errors of a silent group are explained, their cause is the error.
 """
@@ -171,6 +171,8 @@ class _Cause(NamedTuple):
     at: int
     ended: int
     was_said: bool = False
+    is_aside: bool = False
+    """Whether it is about an optional input, and no reason for what befalls the others."""
 
 
 class Judge:
@@ -237,7 +239,8 @@ class Judge:
             self._causes = {key: cause for key, cause in self._causes.items() if longest_ago <= cause.at <= now}
         for finding in found:
             if finding.explains and finding.code in EXPLAINS:
-                self._causes[finding.code, finding.input] = _Cause(finding, now, _ended(finding, facts))
+                cause = _Cause(finding, now, _ended(finding, facts), is_aside=_is_aside(finding, facts))
+                self._causes[finding.code, finding.input] = cause
 
     def _is_explained(self, code: Code, facts: GroupFacts) -> bool:
         """Whether a cause that holds now explains all findings of a code."""
@@ -272,7 +275,7 @@ class Judge:
         (few,) = _FEW_SETS.findings(facts)
         over = [each for each in self._causes.values() if each.was_said and _explains(each, few, facts)]
         if over:
-            cause, _, ended, _ = max(over, key=lambda each: each.at)
+            cause, _, ended, *_ = max(over, key=lambda each: each.at)
             until = f"until {words.seconds(facts.figures.now - ended)} ago, {cause.text}"
             text = f"{rules_matching.left_of_possible(facts)}; {until}"
             few = replace(cause, severity=least, text=text, suggestion=None, is_over=True)
@@ -306,7 +309,7 @@ def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
     explained, about = EXPLAINS[cause.finding.code], cause.finding.input
     if finding.code not in explained.in_group and finding.code not in explained.of_input:
         return False
-    is_narrow = finding.code not in explained.in_group or (about is not None and not facts.inputs[about].required)
+    is_narrow = finding.code not in explained.in_group or cause.is_aside
     if is_narrow and about is not None and about != finding.input:
         return False
     since = _seen_since(finding.code, facts)
@@ -318,6 +321,13 @@ def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
         since = max(since, _seen_since(Code.FEW_SETS, facts))
     # Nor is one that ended when fewer sets, or none, should have left since, however long it is remembered.
     return (cause.ended if looks_back or finding.severity is Severity.ERROR else cause.at) >= since
+
+
+def _is_aside(finding: Finding, facts: GroupFacts) -> bool:
+    if finding.input is None or facts.inputs[finding.input].required:
+        return False
+    # An optional input whose stamps jump back and forth restarts the matching of all.
+    return not rules_stamps.swings(facts.inputs[finding.input])
 
 
 def _ended(finding: Finding, facts: GroupFacts) -> int:

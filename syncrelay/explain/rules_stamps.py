@@ -251,6 +251,11 @@ def several_publishers(facts: GroupFacts, index: int, an_input: InputFacts) -> F
     )
 
 
+def swings(an_input: InputFacts) -> bool:
+    """Whether stamps of an input jump back and forth, so that the matching of its group restarts each time."""
+    return an_input.figures.swings >= _FEWEST_SWINGS
+
+
 def clock_step(facts: GroupFacts) -> Found:
     """Find a clock that was set: this machine's, that of one input, or the one that stamps them all."""
     now = facts.figures.now

@@ -197,6 +197,13 @@ def test_an_optional_input_explains_nothing_of_the_others():
     assert codes(judge(a_group(slow, LIDAR, an_input("/imu"), figures=WIDE))) == [Code.SLOWED, Code.OVER_SLOP]
 
 
+def test_an_optional_input_of_two_clocks_restarts_the_matching_of_all():
+    two = Endpoint("/a", "sensor_msgs/msg/Image"), Endpoint("/b", "sensor_msgs/msg/Image")
+    extra = camera(required=False, publishers=two, figures={"swings": 2, "swung_by": 3 * S})
+    (only,) = judge(a_silent_group(extra, LIDAR, an_input("/imu")))
+    assert (only.code, only.severity) == (Code.SEVERAL_PUBLISHERS, Severity.ERROR)
+
+
 def test_what_is_about_one_input_explains_it_on_that_input_only():
     two = Endpoint("/a", "sensor_msgs/msg/Image"), Endpoint("/b", "sensor_msgs/msg/Image")
     both = camera(publishers=two, figures={"duplicates": 50}), an_input("/lidar", figures={"duplicates": 50})
