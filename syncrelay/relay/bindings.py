@@ -44,6 +44,11 @@ class GroupBinding:
             return f"a subscriber of {one_of(each.topic_name for each in self.publishers)}"
         return missing or None
 
+    def feed(self) -> None:
+        """Feed its inputs, those that are to be fed now. On the loop's thread."""
+        for each in self.inputs:
+            each.topic.outputs.feed()
+
     @property
     def publishers(self) -> list[Publisher]:
         """Those whose subscribers keep a lazy group awake. On the main thread."""
@@ -105,8 +110,7 @@ class GroupBindings:
 
         def turn() -> None:
             switch()
-            for each in binding.inputs:
-                each.topic.outputs.feed()
+            binding.feed()
 
         self._loop.call(turn).result()
         for each in binding.inputs:

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
@@ -25,6 +26,7 @@ from syncrelay.runtime import Runtime
 
 # As with what DDS refuses of inputs and outputs.
 _TRY_AGAIN_S: Final = 5.0
+_UNFIT: Final = (TypeImportError, BundleError, UnreadableFieldError)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,13 +65,15 @@ class Bundles:
             if group not in self._made:
                 made = next((made for made in self._made.values() if made.fits(config)), None)
                 if made is not None:
-                    self._connect(group, made)
+                    # What is wrong with it is said once it runs.
+                    with suppress(*_UNFIT):
+                        self._connect(group, made)
 
     def follow(self, bindings: Sequence[GroupBinding], *, has_changed: bool = True) -> None:
         """Publish what these groups give, as their inputs are received, and end the publishers of all others."""
         by_group = {binding.group: binding for binding in bindings}
         self._end_others(by_group)
-        may_try = has_changed or self._runtime.monotonic() - self._refused_at >= _TRY_AGAIN_S
+        may_try = self._runtime.monotonic() - self._refused_at >= _TRY_AGAIN_S
         for group, config in self._bundled(by_group):
             inputs = by_group[group].inputs
             profile = self._profile([each.topic for each in inputs], group)
@@ -77,14 +81,21 @@ class Bundles:
             is_due = made is None or made.profile != profile or has_changed
             if profile is not None and is_due and (group not in self._refusals or may_try):
                 self._try(group, config, profile, [each.topic for each in inputs])
-            made, bundle = self._made.get(group), by_group[group].bundle
-            bundle.refusal = self._refusals.get(group)
-            bundle.publisher, bundle.profile = (None, None) if made is None else (made.publisher, made.profile)
+            self._show(by_group[group])
 
     def wait_until_acknowledged(self, deadline: int) -> None:
         """Give reliable subscribers until `deadline`, by time.monotonic_ns(), to get what was published last."""
         for made in self._made.values():
             made.publisher.wait_until_acknowledged(max(0, deadline - self._runtime.monotonic_ns()))
+
+    def _show(self, binding: GroupBinding) -> None:
+        """Note what is made of a group's bundles, and feed it if it waited for that."""
+        made, bundle = self._made.get(binding.group), binding.bundle
+        before = bundle.publisher, bundle.refusal
+        bundle.refusal = self._refusals.get(binding.group)
+        bundle.publisher, bundle.profile = (None, None) if made is None else (made.publisher, made.profile)
+        if before != (bundle.publisher, bundle.refusal):
+            self._loop.call(binding.feed).result()
 
     def _bundled(self, groups: Iterable[GroupRelay]) -> Iterator[tuple[GroupRelay, BundleConfig]]:
         if self._entities.purpose is Purpose.RELAY:
@@ -119,7 +130,7 @@ class Bundles:
             if before is None or before.profile != profile:
                 self._make(group, config, profile)
                 self._end(before)
-        except (TypeImportError, BundleError, UnreadableFieldError) as error:
+        except _UNFIT as error:
             self._refuse(group, Refusal("publish", config.topic, config.type, why=str(error)))
         except RefusedError as error:
             self._refuse(group, error.refusal)

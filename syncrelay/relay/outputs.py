@@ -54,6 +54,11 @@ class Output:
         """Whether its messages leave on a topic of their own, and not only in bundles."""
         return self.group.config.options.outputs
 
+    @property
+    def waits_for_bundle(self) -> bool:
+        """Whether its messages could not leave yet, because the bundle's publisher is about to be made."""
+        return not self.is_separate and self.group.flow.bundle is None and self.bundle.refusal is None
+
     def outlet(self, backend: RclBackend) -> Outlet:
         """Return the outlet of its publisher: the same for as long as that is, so that it counts what was sent."""
         if self._outlet is None or self._outlet[0] is not self.publisher:
@@ -150,6 +155,8 @@ class Outputs:
     def feed(self) -> None:
         """Feed those that have a handler, whose messages can leave, and whose group is awake."""
         fed = [each for each in self.all if not each.refusal and not each.group.sleeps]
+        if self._publishes:
+            fed = [each for each in fed if not each.waits_for_bundle]
         self._handlers = [each.handler for each in fed if each.handler]
         if self.source is None:
             return

@@ -30,7 +30,7 @@ _OUTPUTS = {
 
 
 def test_colcon_finds_one_package_in_the_clone(workspace: Workspace):
-    assert workspace.colcon("list", "--names-only").split() == ["syncrelay"]
+    assert workspace.colcon("list", "--names-only", "--base-paths", "src/syncrelay").split() == ["syncrelay"]
 
 
 def test_no_package_below_the_clone_would_be_built_by_itself(workspace: Workspace):
