@@ -7,7 +7,6 @@ from syncrelay.clock import UNREADABLE, Step
 from syncrelay.config import Tolerance
 from syncrelay.config.profile import Mismatch
 from syncrelay.explain.cause_log import CauseLog
-from syncrelay.explain.causes import Trouble, listed, troubles
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import BOUNDS_NS, Distribution, Histogram
 from syncrelay.explain.dry_run import EngineDriver
@@ -36,6 +35,7 @@ from syncrelay.explain.rules_graph import no_other_node
 from syncrelay.explain.standing import NO_SET_MISSED, Share, Standing
 from syncrelay.explain.steps import STEP_NS
 from syncrelay.explain.tape import Left, Stamps, Tape
+from syncrelay.explain.troubles import Trouble, listed, troubles
 from syncrelay.explain.try_budget import TryBudget
 from syncrelay.explain.unneeded import FOR_WANT_OF_A_PARTNER, DropFates, drop_fates, may_set_pace
 from syncrelay.explain.watch import GroupWatch

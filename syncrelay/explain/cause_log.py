@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from syncrelay.explain.causes import Cause, Found, named, sentence, topics_by_cause, worst_first
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.findings import Finding
+from syncrelay.explain.troubles import Cause, Found, named, sentence, topics_by_cause, worst_first
 
 _SECOND: Final = 1_000_000_000
 # Lines wait until every group was judged, but no longer than this: a bug may have stopped a group.
