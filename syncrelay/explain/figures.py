@@ -1,7 +1,8 @@
 """What is seen of a group and of its inputs at one moment, as values."""
 
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from operator import sub
 from statistics import median_low
 from typing import Final
@@ -10,7 +11,7 @@ from syncrelay.clock import Step
 from syncrelay.explain.clocks import Drift
 from syncrelay.explain.distribution import EMPTY, NOTHING, Distribution, Histogram
 from syncrelay.explain.epochs import Reading
-from syncrelay.explain.standing import NOT_KNOWN, Share
+from syncrelay.explain.standing import NOT_KNOWN, Share, Shares
 from syncrelay.sync.messages import DropReason
 
 _SHOWN_SETS: Final = 100
@@ -37,6 +38,10 @@ class InputFigures:
     """How many messages arrived."""
     dropped: Mapping[DropReason, int] = field(default_factory=dict)
     """How many were dropped, by reason."""
+    last_faults: Mapping[DropReason, int] = field(default_factory=dict)
+    """When messages were last seen that were malformed, had no stamp or repeated one."""
+    changed_at: int = 0
+    """When its stamps or its pace were last found to be others than before."""
     flows_since: int | None = None
     """When its first message came, or the first after a silence."""
     received: Sequence[int] = ()
@@ -59,6 +64,8 @@ class InputFigures:
     """How many had an older stamp than the one before."""
     faulty_looks: int = 2
     """In how many looks there were such stamps: in one alone where a clock was set."""
+    faulty_since: int | None = None
+    """When the last but one of these looks was. None of fewer."""
     nearest: Distribution = NOTHING
     """Of an optional input: the spans of the tightest sets with it, whenever its messages came."""
     bursts: int = 0
@@ -129,10 +136,14 @@ class GroupFigures:
     """The rate of the input, or of the clock, that sets the pace: no more sets are possible."""
     last_set: int | None = None
     """When the last set left."""
+    left_at: Sequence[int] = ()
+    """When sets were last seen to have left, look by look."""
     resumed: int | None = None
     """When the first set left after a silence."""
     share: Share = NOT_KNOWN
     """How many of the possible sets left."""
+    shares: Shares = field(default=lambda _: NOT_KNOWN, compare=False, repr=False)
+    """How many did since a time, as long as that is within the time of `share`."""
     span_histogram: Histogram = EMPTY
     """The spans of all sets, counted."""
     latency_histogram: Histogram = EMPTY
@@ -148,11 +159,28 @@ class GroupFigures:
     nearest_since: Distribution = NOTHING
     """Those of them that were measured after the last set."""
     nearest_from: int = 0
-    """Since when `nearest` is measured: at the latest since an input changed its pace."""
+    """Since when `nearest` is measured: at the latest since an input changed its pace or its clock."""
+    nearest_at: Sequence[int] = ()
+    """When each of `nearest` was measured."""
     missing: tuple[float, ...] = ()
     """The share, 0 to 1, of the window's sets that each input is missing from."""
     sets_since_without: tuple[int, ...] = ()
     """How many sets there were since the last one without each input."""
+
+    def measured_since(self, at: int) -> "GroupFigures":
+        """Return the same without the spans that were measured until then."""
+        old = bisect_right(self.nearest_at, at)
+        if not old:
+            return self
+        kept, lately = len(self.nearest) - old, len(self.nearest_lately)
+        nearest = Distribution(self.nearest.newest(kept)[::-1])
+        return replace(
+            self,
+            nearest=nearest,
+            nearest_lately=nearest if kept < lately else self.nearest_lately,
+            nearest_from=self.nearest_at[old] if kept else self.now,
+            nearest_at=self.nearest_at[old:],
+        )
 
     @property
     def last_sets(self) -> tuple[tuple[int, int], ...]:

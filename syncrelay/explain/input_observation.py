@@ -34,7 +34,15 @@ _DRIFT_POINTS: Final = 300
 # Drift costs more than all other figures, and from many points it changes slowly.
 _DRIFT_EVERY: Final = 5
 _FEW_POINTS: Final = 12
+_NONE: Final[Mapping[DropReason, int]] = {}
 _PERIODS: Final = 20
+# So many stamps show a pace, if they run as time does but for this share.
+_PACED: Final = 41
+_AS_TIME: Final = 0.1
+# Stamps of another rate have jumped where a delay differs from the one before by so many times as much as usual.
+_FAR: Final = 10
+# No message is late by so much more or less than the one before it.
+_FAR_NS: Final = 10 * _SECOND
 
 
 class _Faults(NamedTuple):
@@ -69,6 +77,9 @@ class InputObservation:
         self._steps = StampSteps()
         self._delay_before: int | None = None
         self._is_simulated = False
+        self._is_misread = False
+        self.changed_at = 0
+        """When its stamps or its pace were last found to be others than before."""
 
     def add(self, arrivals: Arrivals, *, by_clock: Callable[[int], int] | None = None) -> bool:
         """Take what came; whether its stamps have fallen back by more than a second.
@@ -83,11 +94,7 @@ class InputObservation:
         if (self._received and last < self._received[-1]) or was_simulated is not self._is_simulated:
             self._forget()
             self._forget_steps()
-        if self._first is None or last < self._first:
-            self._first = self._flows_since = received[0]
-        elif self._flows_since is None or last < self._flows_since or self._is_silent_at(received[0]):
-            self._flows_since = received[0]
-            self.forget_clock()
+        self._follow_flow(received)
         duplicates, out_of_order, fallen = self._judge(stamps, received)
         all_received = received
         # A stamp of 0 was never set: it tells nothing of a clock.
@@ -95,14 +102,10 @@ class InputObservation:
         if stamped and stamped is not arrivals:
             stamps, received = zip(*stamped, strict=True)
         delays = list(map(sub, map(by_clock, received) if by_clock else received, stamps)) if stamped else []
-        least, most = (min(delays), max(delays)) if delays else (0, 0)
         if delays:
-            self._follow_steps(received, delays, least, most)
-        # Of two clocks in turn, each fall is followed by a rise: nothing begins anew.
-        if fallen and not self._steps.swings(last)[0]:
-            self._delay_before = self._steps.least
-            self._forget()
-            self._steps.forget_clock()
+            self._follow_steps(received, delays)
+        if begin := self._begin_anew(received, delays, has_fallen=fallen):
+            stamped, stamps, delays = [*stamped][begin:], stamps[begin:], delays[begin:]
         while self._faults and self._faults[0].at <= last - WINDOW_NS:
             self._faults.popleft()
         self._faults.append(_Faults(last, duplicates, out_of_order))
@@ -111,14 +114,24 @@ class InputObservation:
         keep_last(self._stamps, stamps if delays else (), _TRIED_MESSAGES)
         keep_last(self._delays, delays, _TRIED_MESSAGES)
         # What is held up, and then comes at once, was sent at the pace of its stamps.
-        self._observe_pace(self._stamps if delays else self._received)
+        # Where it does not run as time does, that is not known.
+        self._observe_pace(self._stamps if delays and not self._is_misread else self._received, len(arrivals))
         if delays:
-            self._measure(stamped, delays, least, most)
+            self._measure(stamped, delays, min(delays), max(delays))
         return fallen
 
-    def _follow_steps(self, received: Sequence[int], delays: Sequence[int], least: int, most: int) -> None:
+    def _follow_flow(self, received: Sequence[int]) -> None:
+        """Look whether it has begun to come, for the first time or after a silence."""
+        last = received[-1]
+        if self._first is None or last < self._first:
+            self._first = self._flows_since = received[0]
+        elif self._flows_since is None or last < self._flows_since or self._is_silent_at(received[0]):
+            self._flows_since = self.changed_at = received[0]
+            self.forget_clock()
+
+    def _follow_steps(self, received: Sequence[int], delays: Sequence[int]) -> None:
         """Look whether the clock was set. What was stamped before tells nothing of it now."""
-        at = self._steps.add(received, delays, least, most, period=lambda: _median_period(self._received))
+        at = self._steps.add(received, delays, min(delays), max(delays), period=lambda: _median_period(self._received))
         if at is not None:
             step, now = self._steps.last, self._steps.least
             if step is not None and step.at == at and now is not None:
@@ -126,14 +139,43 @@ class InputObservation:
             old = sum(stamp + delay < at for stamp, delay in zip(self._stamps, self._delays, strict=True))
             del self._stamps[:old], self._delays[:old]
             self._forget_drift()
+            self.changed_at = at
 
-    def _observe_pace(self, times: Sequence[int]) -> None:
+    def _begin_anew(self, received: Sequence[int], delays: Sequence[int], *, has_fallen: bool) -> int:
+        """Look whether stamps jumped by what is no delay, and if so forget the clock that they were of.
+
+        Return the first of the new messages that are of the clock of now.
+        """
+        by = _steps([*self._delays[-1:], *delays])
+        # Stamps that do not run as time does may have come to do so.
+        least = _JUMP_NS if has_fallen or self._is_misread else _FAR_NS
+        # As nearly always. Of two clocks in turn, each fall is followed by a rise: nothing begins anew.
+        if max(map(abs, by), default=0) <= least or self._steps.swings(received[-1])[0]:
+            return 0
+        # Of seconds that are milliseconds, each is far from the one before it.
+        usual = median(map(abs, [*_steps(self._delays[-_PERIODS:]), *by]))
+        far = [index for index, each in enumerate(by, len(delays) - len(by)) if abs(each) > max(least, _FAR * usual)]
+        if has_fallen:
+            self._delay_before = self._steps.least
+            self._forget()
+        if far or has_fallen:
+            self.changed_at = received[far[-1] if far else -1]
+            del self._stamps[:], self._delays[:]
+            self._forget_drift()
+            self._steps.forget_clock()
+            if self._is_misread:
+                self._steps.forget_levels()
+                self._pace.forget()
+        return far[-1] if far else 0
+
+    def _observe_pace(self, times: Sequence[int], fresh: int) -> None:
         before = self._pace.slowed_from
-        self._pace.observe(times)
+        self._pace.observe(times, fresh)
         if before != self._pace.slowed_from:
             # The least delay of fewer messages is greater: that is no drift, and no step.
             self._forget_drift()
             self._steps.forget_levels()
+            self.changed_at = self._received[-1]
 
     def forget_publishers(self) -> None:
         """Bear that others publish now than did: their rate and their clocks are not those of before."""
@@ -164,7 +206,15 @@ class InputObservation:
     @property
     def pace(self) -> Pace:
         """When the first and the last message came, and how steadily; without a last one where a clock jumped since."""
-        return Pace(self._first, self._received[-1] if self._received else None, steady_period(self._paced))
+        last = self._received[-1] if self._received else None
+        return Pace(self._first, last, steady_period(self._paced) or self._steady_by_stamps())
+
+    def _steady_by_stamps(self) -> float | None:
+        """Return the period of stamps that are steadier than their way here, and run as time does."""
+        stamps, delays = self._stamps[-_PACED:], self._delays[-_PACED:]
+        if len(stamps) < 2 or abs(delays[-1] - delays[0]) > _AS_TIME * abs(stamps[-1] - stamps[0]):  # noqa: PLR2004
+            return None
+        return steady_period(sorted(stamps))
 
     @property
     def period(self) -> float:
@@ -175,16 +225,31 @@ class InputObservation:
         """Take the spans of the tightest sets with this input."""
         keep_last(self._nearest, spans, _LAST_MESSAGES)
 
-    def figures(self, *, fed: int, dropped: Mapping[DropReason, int], seconds: float, now: int) -> InputFigures:
+    def figures(
+        self,
+        *,
+        fed: int,
+        dropped: Mapping[DropReason, int],
+        last_faults: Mapping[DropReason, int] = _NONE,
+        seconds: float,
+        now: int,
+    ) -> InputFigures:
         """Give the figures; counts are those of the window, which is so many seconds long."""
         fell_by, fell_at = self._fell or (None, None)
         rate_hz, usual_hz = self._rates(fed, seconds, now)
         faulty = [each for each in self._faults if each.at > now - WINDOW_NS and (each.duplicates or each.out_of_order)]
+        repeated = [each.at for each in faulty if each.duplicates]
         swings, swung_by = self._steps.swings(now)
         # Of what comes no more, nothing will be known soon.
         goes_on = not self._is_silent_at(now)
         may_step = self._steps.may_step and goes_on
         bursts = [each for each in self._bursts if each.at > now - WINDOW_NS]
+        # Across a step they seem to run at any rate.
+        misread = None if may_step else reading(self._stamps, self._delays)
+        if self._is_misread is not (misread is not None):
+            # The paces were those of stamps.
+            self._is_misread = misread is not None
+            self._pace.forget()
         return InputFigures(
             rate_hz=rate_hz,
             usual_hz=usual_hz,
@@ -193,17 +258,19 @@ class InputObservation:
             may_be_slower=self._pace.may_be_slower and goes_on,
             fed=fed,
             dropped=dropped,
+            last_faults={**last_faults, DropReason.DUPLICATE: max(repeated)} if repeated else last_faults,
+            changed_at=self.changed_at,
             flows_since=self._flows_since,
             received=self._received[:],
             stamps=self._stamps[-_LAST_MESSAGES:],
             delays=self._delays[-_LAST_MESSAGES:],
             drift=self._drift,
-            # Across a step they seem to run at any rate.
-            reading=None if may_step else reading(self._stamps, self._delays),
+            reading=misread,
             resolution=resolution(self._stamps),
             duplicates=sum(each.duplicates for each in faulty),
             out_of_order=sum(each.out_of_order for each in faulty),
             faulty_looks=len(faulty),
+            faulty_since=faulty[-2].at if len(faulty) > 1 else None,
             nearest=Distribution(self._nearest[:]),
             bursts=len(bursts),
             held=max((each.held for each in bursts), default=0),
@@ -306,5 +373,9 @@ class InputObservation:
 
 def _median_period(times: Sequence[int]) -> float:
     """Return the median of the last periods, 0 of too few."""
-    last = times[-_PERIODS:]
-    return median(map(sub, last[1:], last)) if len(last) > 1 else 0.0
+    periods = _steps(times[-_PERIODS:])
+    return median(periods) if periods else 0.0
+
+
+def _steps(times: Sequence[int]) -> Sequence[int]:
+    return list(map(sub, times[1:], times))

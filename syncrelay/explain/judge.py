@@ -8,11 +8,14 @@ said and suggests nothing, while its cause holds and until the messages of that 
   the wide spans that such an input explains.
 - A finding about an optional input explains others about this input only, unless its stamps jump back and forth.
 - A finding whose `explains` is False is too small to explain others.
+- A cause that is over explains no more once few of the sets left that were possible since. What else is found is said
+  first.
 - If all errors of a silent group are explained, their cause is the error.
 """
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from math import inf
 from typing import Final, NamedTuple
 
 from syncrelay.explain import (
@@ -27,10 +30,11 @@ from syncrelay.explain import (
 )
 from syncrelay.explain.codes import MATCHING, Code, Of, Severity, codes_of
 from syncrelay.explain.facts import GroupFacts
-from syncrelay.explain.findings import Finding, Rule, of_each_input
+from syncrelay.explain.findings import SECOND, Finding, Rule, of_each_input
 from syncrelay.explain.input_observation import WINDOW_NS
 from syncrelay.explain.known_soon import known_soon
-from syncrelay.explain.standing import BACK, Standing
+from syncrelay.explain.standing import BACK, FEW, Standing
+from syncrelay.sync.messages import DropReason
 
 _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     Rule(Code.INTERNAL_ERROR, rules_graph.internal_error),
@@ -60,6 +64,7 @@ _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     Rule(Code.BURSTS, rules_flow.bursts),
     of_each_input(Code.TIME_JUMP, rules_stamps.time_jump),
     of_each_input(Code.MESSAGES_LOST, rules_flow.messages_lost),
+    of_each_input(Code.OUT_OF_ORDER, rules_stamps.out_of_order),
     of_each_input(Code.DUPLICATES, rules_stamps.duplicates),
 )
 
@@ -75,10 +80,13 @@ _MATCHING_RULES: Final[tuple[Rule, ...]] = (
 """What they suggest they try, which costs: they are not asked for what a cause explains."""
 
 _OTHER_RULES: Final[tuple[Rule, ...]] = (
-    of_each_input(Code.OUT_OF_ORDER, rules_stamps.out_of_order),
     of_each_input(Code.SUBSCRIBER_QOS, rules_graph.subscriber_qos),
     of_each_input(Code.OUTPUT_TAKEN, rules_graph.output_taken),
 )
+# A cause is seen to be over at the next look. By then, what it has left in queues is gone.
+_SETTLES: Final = round(1.1 * SECOND)
+# So many messages in a row without a fault show that it is over.
+_NO_MORE: Final = 3
 _FEW_SETS: Final = Rule(Code.FEW_SETS, rules_matching.few_sets)
 
 
@@ -92,6 +100,13 @@ class _Explained(NamedTuple):
 _ORDER: Final = codes_of(Of.ORDER)
 _FLOW: Final = codes_of(Of.MESSAGES, Of.ORDER, Of.MATCHING) | {Code.NO_CLOCK}
 """What messages tell, and not the graph."""
+
+_COUNTED: Final = {
+    Code.MALFORMED: DropReason.MALFORMED,
+    Code.UNSTAMPED: DropReason.UNSTAMPED,
+    Code.DUPLICATES: DropReason.DUPLICATE,
+}
+_OF_CLOCKS: Final = frozenset({Code.OTHER_CLOCK, Code.CLOCK_STEP, Code.CLOCK_DRIFT})
 
 # What can be mended before the node is activated.
 _SAID_OF_THE_INACTIVE: Final = frozenset(
@@ -133,6 +148,7 @@ EXPLAINS: Final[Mapping[Code, _Explained]] = {
     Code.MESSAGES_LOST: _Explained(
         frozenset({Code.OVER_SLOP, Code.FEW_SETS, Code.UNEXPLAINED}), frozenset({Code.BURSTS})
     ),
+    Code.OUT_OF_ORDER: _Explained(frozenset({Code.OVER_SLOP, Code.FEW_SETS, Code.UNEXPLAINED})),
     Code.DUPLICATES: _Explained(frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET, Code.FEW_SETS, Code.UNEXPLAINED})),
 }
 """Causes, and which other findings they explain. No chain of explanations comes back to where it began."""
@@ -146,9 +162,13 @@ def explained_by(code: Code) -> frozenset[Code]:
 
 def _first_step(facts: GroupFacts) -> int:
     steps = (each.figures.stepped for each in facts.inputs)
-    return min(
-        [facts.figures.now - WINDOW_NS, *(step.at for step in steps if step and rules_stamps.is_told(facts, step))]
-    )
+    told = (step.at for step in steps if step and rules_stamps.is_told(facts, step))
+    return min(told, default=facts.figures.now)
+
+
+def _faulty_since(facts: GroupFacts) -> int:
+    known = (each.figures.faulty_since for each in facts.inputs)
+    return max((at for at in known if at is not None), default=facts.figures.now - WINDOW_NS)
 
 
 _SEEN_SINCE: Final[Mapping[Code, Callable[[GroupFacts], int]]] = {
@@ -157,9 +177,18 @@ _SEEN_SINCE: Final[Mapping[Code, Callable[[GroupFacts], int]]] = {
     # What the graph shows, it shows of now.
     Code.NO_PUBLISHER: lambda facts: facts.figures.now,
     Code.NO_CLOCK: lambda facts: facts.figures.now,
-    Code.OVER_SLOP: lambda facts: min(facts.figures.nearest_from, facts.figures.now - WINDOW_NS),
+    Code.OUT_OF_ORDER: _faulty_since,
+    Code.DUPLICATES: _faulty_since,
+    Code.OVER_SLOP: lambda facts: facts.figures.nearest_from,
+    Code.CONSTANT_OFFSET: lambda facts: min(
+        (each.figures.received[-rules_matching.ENOUGH :][0] for each in facts.inputs if each.figures.received),
+        default=facts.figures.now,
+    ),
     Code.CLOCK_STEP: _first_step,
-    Code.FEW_SETS: lambda facts: facts.figures.now - max(WINDOW_NS, facts.figures.share.ns),
+    Code.BURSTS: lambda facts: max(
+        (begin for each in facts.inputs for begin, _ in each.figures.held_up), default=facts.figures.now
+    ),
+    Code.FEW_SETS: lambda facts: facts.figures.now - facts.figures.share.ns,
 }
 """Since when the messages came that a finding judges by, where that is not the usual window."""
 
@@ -170,6 +199,8 @@ class _Cause(NamedTuple):
     finding: Finding
     at: int
     ended: int
+    most: float = inf
+    """How many sets it may have cost."""
     was_said: bool = False
     is_aside: bool = False
     """Whether it is about an optional input, and no reason for what befalls the others."""
@@ -181,12 +212,15 @@ class Judge:
     def __init__(self) -> None:
         self._causes: dict[tuple[Code, int | None], _Cause] = {}
         self._too_wide: Finding | None = None
+        self._missing_since: int | None = None
 
     def judge(self, facts: GroupFacts) -> tuple[Finding, ...]:
         """Return what is not as usual, an error at least of a silent group; see `with_ok` for what is well."""
         # Of two publishers whose names are not known yet, the same may be said.
         found = [*dict.fromkeys(finding for rule in _CAUSE_RULES for finding in rule.findings(facts))]
         self._remember(found, facts)
+        facts = self._since_the_last_cause(facts)
+        self._missing_since = self._few_left_since(facts)
         for rule in () if facts.is_new else _MATCHING_RULES:
             if self._is_explained(rule.code, facts):
                 continue
@@ -219,6 +253,9 @@ class Judge:
         # What is the effect of another cause is over when its cause is.
         own = wide if wide is not None and self._root(wide, facts) is wide else None
         self._too_wide, before = own or (None if is_back else self._too_wide), self._too_wide
+        if rules_matching.is_near_again(facts):
+            self._too_wide = None
+            return ()
         if wide is not None or is_back or before is None or self._is_explained(Code.OVER_SLOP, facts):
             return ()
         return (before,)
@@ -237,15 +274,32 @@ class Judge:
         if self._causes:
             longest_ago = min([now - WINDOW_NS, *(seen_since(facts) for seen_since in _SEEN_SINCE.values())])
             self._causes = {key: cause for key, cause in self._causes.items() if longest_ago <= cause.at <= now}
+            # Whether a clock runs wrong is not known while it may have been set, and goes on until then.
+            self._causes = {
+                key: cause._replace(ended=now) if any(facts.inputs[at].figures.may_step for at in about) else cause
+                for key, cause in self._causes.items()
+                for about in [cause.finding.about if cause.finding.code in _OF_CLOCKS else ()]
+            }
         for finding in found:
             if finding.explains and finding.code in EXPLAINS:
-                cause = _Cause(finding, now, _ended(finding, facts), is_aside=_is_aside(finding, facts))
-                self._causes[finding.code, finding.input] = cause
+                self._causes[finding.code, finding.input] = _Cause(
+                    finding,
+                    now,
+                    _ended(finding, facts),
+                    _most(finding, facts),
+                    is_aside=_is_aside(finding, facts),
+                )
+
+    def _since_the_last_cause(self, facts: GroupFacts) -> GroupFacts:
+        """Return the facts without how far stamps were apart while a cause held that is over: it has explained that."""
+        over = (cause.ended for cause in self._causes.values() if Code.OVER_SLOP in explained_by(cause.finding.code))
+        ended = max((at for at in over if at < facts.figures.now), default=None)
+        return facts if ended is None else replace(facts, figures=facts.figures.measured_since(ended))
 
     def _is_explained(self, code: Code, facts: GroupFacts) -> bool:
         """Whether a cause that holds now explains all findings of a code."""
         return any(
-            cause.at == facts.figures.now
+            _effects_until(cause, code) >= facts.figures.now
             and code in EXPLAINS[cause.finding.code].in_group
             and (cause.finding.input is None or facts.inputs[cause.finding.input].required)
             for cause in self._causes.values()
@@ -254,7 +308,7 @@ class Judge:
     def _unexplained_by_others(self, found: Iterable[Finding], facts: GroupFacts) -> tuple[Finding, ...]:
         """Return the findings that nothing explains; of a silent group an error, be it a cause that is over."""
         roots = [(finding, self._root(finding, facts)) for finding in found]
-        said = [finding for finding, root in roots if finding is root]
+        said = sorted((finding for finding, root in roots if finding is root), key=self._is_past)
         blamed = [root for finding, root in roots if finding.severity is Severity.ERROR]
         if blamed and not any(finding.severity is Severity.ERROR for finding in said):
             culprit = blamed[0]
@@ -267,27 +321,84 @@ class Judge:
         """Return findings of which one is as bad as the share of sets that left: its cause, or that there are few."""
         least = Severity.ERROR if facts.standing is Standing.NONE else Severity.WARN
         # What is too small to be the cause, or is none of this, leaves open why sets are missing.
-        told = [each for each in said if each.severity is not Severity.OK and _is_why(each)]
+        spent = [each.finding for each in self._causes.values() if self._is_spent(each, facts)]
+        told = [
+            each
+            for each in said
+            if each.severity is not Severity.OK and _is_why(each) and not any(each is of for of in spent)
+        ]
         if any(each.severity >= least for each in told):
             return said
         if told:
             return tuple(replace(each, severity=least) if each is told[0] else each for each in said)
+        if self._missing_since is not None:
+            # What causes have cost is not what is missing since.
+            since = facts.figures.shares(self._missing_since)
+            facts = replace(facts, figures=replace(facts.figures, share=since))
         (few,) = _FEW_SETS.findings(facts)
-        over = [each for each in self._causes.values() if each.was_said and _explains(each, few, facts)]
+        over = [each for each in self._causes.values() if each.was_said and self._explains(each, few, facts)]
         if over:
-            cause, _, ended, *_ = max(over, key=lambda each: each.at)
-            until = f"until {words.seconds(facts.figures.now - ended)} ago, {cause.text}"
+            cause = max(over, key=lambda each: each.at)
+            until = f"until {words.seconds(facts.figures.now - cause.ended)} ago, {cause.finding.text}"
             text = f"{rules_matching.left_of_possible(facts)}; {until}"
-            few = replace(cause, severity=least, text=text, suggestion=None, is_over=True)
+            few = replace(cause.finding, severity=least, text=text, suggestion=None, is_over=True)
         return (few, *said)
+
+    def _is_past(self, finding: Finding) -> bool:
+        """Whether a finding is of what is over."""
+        cause = self._causes.get((finding.code, finding.input))
+        return cause is not None and cause.finding is finding and cause.ended < cause.at
 
     def _root(self, finding: Finding, facts: GroupFacts) -> Finding:
         """Return the cause that explains a finding and that nothing explains, or the finding itself."""
         # A relay that gets too little CPU makes all a little worse: what else is found says more.
         for cause in sorted(self._causes.values(), key=lambda each: each.finding.code is Code.TOO_SLOW):
-            if _explains(cause, finding, facts):
+            if self._explains(cause, finding, facts):
                 return self._root(cause.finding, facts)
         return finding
+
+    def _explains(self, cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
+        if finding.code in MATCHING and self._is_spent(cause, facts):
+            return False
+        looks_back = finding.code is Code.FEW_SETS
+        if looks_back and facts.figures.share.possible - facts.figures.share.left > cause.most:
+            return False
+        is_over = cause.at < facts.figures.now and not looks_back
+        if cause.finding.code.of is Of.GRAPH and is_over and finding.severity is Severity.ERROR:
+            # What the graph shows no more is not why no set leaves now.
+            return False
+        explained, about = EXPLAINS[cause.finding.code], cause.finding.input
+        if finding.code not in explained.in_group and finding.code not in explained.of_input:
+            return False
+        is_narrow = finding.code not in explained.in_group or cause.is_aside
+        if is_narrow and about is not None and about != finding.input:
+            return False
+        since = _seen_since(finding.code, facts)
+        if finding.severity is Severity.ERROR and not looks_back:
+            # A silence is told by what comes now, or does not: a cause that is long over is no reason for it.
+            since = max(since, facts.figures.now - facts.silent_after)
+        elif rules_matching.has_few_sets(facts):
+            # Nor is it one for recently missing sets, however far back the stamps are compared.
+            since = max(since, _seen_since(Code.FEW_SETS, facts))
+        # Nor is one that ended when fewer sets, or none, should have left since, however long it is remembered.
+        return _effects_until(cause, finding.code) >= since
+
+    def _is_spent(self, cause: _Cause, facts: GroupFacts) -> bool:
+        """Whether a cause is over, and few of the sets that were possible since have left: for another reason."""
+        return self._missing_since is not None and _effects_until(cause, Code.FEW_SETS) < facts.figures.now
+
+    def _few_left_since(self, facts: GroupFacts) -> int | None:
+        """Return since when no cause is known of those that keep sets from leaving, if few have left since then."""
+        ends = [
+            _over_since(each, facts)
+            for each in self._causes.values()
+            if Code.FEW_SETS in explained_by(each.finding.code)
+        ]
+        if not ends:
+            return None
+        since = max(ends) + _SETTLES
+        share = facts.figures.shares(since).value
+        return since if share is not None and share < FEW else None
 
 
 def _is_why(finding: Finding) -> bool:
@@ -300,27 +411,23 @@ def judge(facts: GroupFacts) -> tuple[Finding, ...]:
     return Judge().judge(facts)
 
 
-def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
-    looks_back = finding.code is Code.FEW_SETS
-    is_over = cause.at < facts.figures.now and not looks_back
-    if cause.finding.code.of is Of.GRAPH and is_over and finding.severity is Severity.ERROR:
-        # What the graph shows no more is not why no set leaves now.
-        return False
-    explained, about = EXPLAINS[cause.finding.code], cause.finding.input
-    if finding.code not in explained.in_group and finding.code not in explained.of_input:
-        return False
-    is_narrow = finding.code not in explained.in_group or cause.is_aside
-    if is_narrow and about is not None and about != finding.input:
-        return False
-    since = _seen_since(finding.code, facts)
-    if finding.severity is Severity.ERROR and not looks_back:
-        # A silence is told by what comes now, or does not: a cause that is long over is no reason for it.
-        since = max(since, facts.figures.now - facts.silent_after)
-    elif rules_matching.has_few_sets(facts):
-        # Nor is it one for recently missing sets, however far back the stamps are compared.
-        since = max(since, _seen_since(Code.FEW_SETS, facts))
-    # Nor is one that ended when fewer sets, or none, should have left since, however long it is remembered.
-    return (cause.ended if looks_back or finding.severity is Severity.ERROR else cause.at) >= since
+def _most(finding: Finding, facts: GroupFacts) -> float:
+    """Return how many sets a cause may have cost where it was short: twice those of its time and of a second."""
+    lasted = max(rules_flow.waited_for_relay(facts)) / SECOND + 1
+    return 2 * (1 + lasted * facts.possible_hz) if finding.code is Code.TOO_SLOW else inf
+
+
+def _effects_until(cause: _Cause, code: Code) -> int:
+    """Return until when a cause had effects of a code."""
+    # What is sent again after a standstill comes late once, which makes no step.
+    lasts = cause.finding.code is Code.TOO_SLOW and cause.ended < cause.at and code is not Code.CLOCK_STEP
+    return cause.ended + rules_flow.SENT_AGAIN if lasts else cause.ended
+
+
+def _over_since(cause: _Cause, facts: GroupFacts) -> int:
+    """Return since when a cause can have had no more effect: its inputs flow, and are stamped as they are now."""
+    about = [facts.inputs[index].figures for index in cause.finding.about]
+    return max([_effects_until(cause, Code.FEW_SETS), *(max(each.flows_since or 0, each.changed_at) for each in about)])
 
 
 def _is_aside(finding: Finding, facts: GroupFacts) -> bool:
@@ -331,9 +438,17 @@ def _is_aside(finding: Finding, facts: GroupFacts) -> bool:
 
 
 def _ended(finding: Finding, facts: GroupFacts) -> int:
-    """Return until when a cause that is found now held. That the relay stood still is found for a while after."""
+    """Return until when a cause that is found now held. What is counted is found for as long as it is counted."""
     now = facts.figures.now
-    return min(now, rules_flow.stood_still_until(facts) or now) if finding.code is Code.TOO_SLOW else now
+    if finding.code is Code.TOO_SLOW:
+        return min(now, rules_flow.stood_still_until(facts) or now)
+    reason = _COUNTED.get(finding.code)
+    if finding.input is None or reason is None:
+        return now
+    figures = facts.inputs[finding.input].figures
+    last = figures.last_faults.get(reason, now)
+    # Of a slow input, the next may be as bad.
+    return last if (now - last) * figures.rate_hz > _NO_MORE * SECOND and now - last > _SETTLES else now
 
 
 def _seen_since(code: Code, facts: GroupFacts) -> int:

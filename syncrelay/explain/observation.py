@@ -14,12 +14,15 @@ from syncrelay.explain.input_observation import WINDOW_NS, Arrivals, InputObserv
 from syncrelay.explain.nearest import NearestSpans
 from syncrelay.explain.standing import ShareWindow
 from syncrelay.sync.counts import InputCounts
+from syncrelay.sync.messages import DropReason
 
 SentSets: TypeAlias = Sequence[tuple[tuple[int | None, ...], int]]
 """Stamps of each set in input order, None where one was missing, and the set's latency, in nanoseconds."""
 
 _SECOND: Final = 1_000_000_000
 _LAST_SETS: Final = 500
+_FAULTY: Final = (DropReason.MALFORMED, DropReason.UNSTAMPED)
+_LAST_LOOKS: Final = 60
 _SILENCE: Final = 5 * _SECOND
 # Keep at least this many of a slow input's last messages, however old they are.
 _NEAREST_WINDOW: Final = 60 * _SECOND
@@ -52,12 +55,13 @@ class Observation:
         )
         self._span_histogram, self._latency_histogram = Tallied(), Tallied()
         self._last_set: int | None = None
+        self._left_at = no_values()
         self._resumed: int | None = None
         self._spans, self._latencies = no_values(), no_values()
         self._need(config.enough([0] * len(config.topics)))
         self._nearest, self._nearest_at, self._nearest_since = no_values(), no_values(), no_values()
         self._measured_at = began
-        self._paces: list[float | None] = [None] * len(self.inputs)
+        self._changed_at = 0
         self._sets_since_without = [0] * len(self.inputs)
 
     def add(
@@ -82,14 +86,14 @@ class Observation:
             self._polls.popleft()
         fallen = [each.add(new, by_clock=by_clock) for each, new in zip(self.inputs, arrivals, strict=True)]
         self._follow_needed(now)
-        paces = [each.slowed_from_hz for each in self.inputs]
         clock = None if by_clock is None else by_clock(now)
         self._share.add(counts, total_sets, [each.pace for each in self.inputs], now=now, clock=clock)
-        if paces != self._paces:
-            # What was measured before says nothing of how it is now.
-            self._paces = paces
-            self._forget_nearest()
         self._measure_nearest(arrivals, now, has_jumped=any(fallen))
+        changed_at = max(each.changed_at for each in self.inputs)
+        if changed_at > self._changed_at:
+            # What was measured before says nothing of how it is now.
+            self._changed_at = changed_at
+            self._forget_nearest(until=changed_at)
         if sets:
             spans = [self._span(stamps) for stamps, _ in sets] if any(missing) else self._spans_of_whole(stamps)
             self._take_sets(spans, [latency for _, latency in sets], now)
@@ -105,8 +109,10 @@ class Observation:
             rate_hz=self._rate_hz(),
             best_hz=self._ticks_hz or min(inputs[index].rate_hz for index in counted),
             last_set=self._last_set,
+            left_at=self._left_at[:],
             resumed=self._resumed,
             share=self._share.share(),
+            shares=self._share.shares(),
             span_histogram=self._span_histogram.histogram(),
             latency_histogram=self._latency_histogram.histogram(),
             spans=Distribution(self._spans[:]),
@@ -115,6 +121,7 @@ class Observation:
             nearest_lately=Distribution(self._nearest[self._lately(now) :]),
             nearest_since=Distribution(self._nearest_since[:]),
             nearest_from=self._nearest_at[0] if self._nearest_at else now,
+            nearest_at=self._nearest_at[:],
             missing=self._missing(now),
             sets_since_without=tuple(self._sets_since_without),
         )
@@ -126,10 +133,11 @@ class Observation:
     def begin_again(self, at: int) -> None:
         """Bear that nothing was fed for a while, until now: what came before tells nothing. What left is kept."""
         self._began, self._last_set, self._resumed = at, None, None
+        del self._left_at[:]
         self._polls = deque(poll._replace(at=at, sent=0) for poll in [*self._polls][-1:])
         self.inputs = [InputObservation() for _ in self.inputs]
         self._share.clear()
-        self._paces = [None] * len(self.inputs)
+        self._changed_at = 0
         self._sets_since_without = [0] * len(self.inputs)
         self._forget_nearest()
         self._clear_nearest_spans()
@@ -177,11 +185,13 @@ class Observation:
         self._forget_nearest()
         self._began = min(self._began, now)
         self._last_set = None if self._last_set is None else now
+        del self._left_at[:]
         self._resumed = None if self._resumed is None else now
 
-    def _forget_nearest(self) -> None:
-        for kept in (self._nearest, self._nearest_at, self._nearest_since):
-            del kept[:]
+    def _forget_nearest(self, until: int | None = None) -> None:
+        old = len(self._nearest_at) if until is None else bisect_left(self._nearest_at, until)
+        del self._nearest[:old], self._nearest_at[:old]
+        del self._nearest_since[: max(0, len(self._nearest_since) - len(self._nearest))]
 
     def _clear_nearest_spans(self) -> None:
         for spans in (self._nearest_spans, *self._with_optional.values()):
@@ -230,6 +240,7 @@ class Observation:
         if self._last_set is None or (now - self._last_set >= _SILENCE and saw_none_before):
             self._resumed = now
         self._last_set = now
+        keep_last(self._left_at, [now], _LAST_LOOKS)
         del self._nearest_since[:]
         keep_last(self._spans, spans, _LAST_SETS)
         keep_last(self._latencies, latencies, _LAST_SETS)
@@ -269,9 +280,19 @@ class Observation:
         before, after = self._polls[0].counts[index], self._polls[-1].counts[index]
         gone = {reason: count - before.dropped.get(reason, 0) for reason, count in after.dropped.items()}
         seconds = (self._polls[-1].at - self._polls[0].at) / _SECOND
+        dropped = {reason: n for reason, n in gone.items() if n}
         return self.inputs[index].figures(
-            fed=after.fed - before.fed, dropped={reason: n for reason, n in gone.items() if n}, seconds=seconds, now=now
+            fed=after.fed - before.fed,
+            dropped=dropped,
+            last_faults={reason: self._last_drop(index, reason) for reason in _FAULTY if reason in dropped},
+            seconds=seconds,
+            now=now,
         )
+
+    def _last_drop(self, index: int, reason: DropReason) -> int:
+        """Return when an input's last drop for a reason was seen."""
+        count = self._polls[-1].counts[index].dropped.get(reason, 0)
+        return next(each.at for each in self._polls if each.counts[index].dropped.get(reason, 0) == count)
 
 
 def _since_without(before: int, stamps: Sequence[int | None]) -> int:

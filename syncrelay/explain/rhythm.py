@@ -4,6 +4,7 @@ from bisect import bisect_left, bisect_right
 from collections import deque
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from math import ceil, comb
 from operator import sub
 from statistics import median, median_low
 from typing import Final, NamedTuple
@@ -40,6 +41,8 @@ _SECOND: Final = 1_000_000_000
 _PERIODS: Final = 20
 _PACES: Final = 120
 _FEWEST_PACES: Final = 6
+# Until there are so many, a look may add several.
+_SOON_PACES: Final = 12
 # An input whose pace varies by more than this share of its median is not steady, so it cannot have slowed down ...
 _STEADY: Final = 0.25
 # ... without counting one poll in this many at either end, in which a busy machine held messages up.
@@ -54,42 +57,56 @@ _SLOWED: Final = 0.7
 RECOVERED: Final = 0.85
 
 
-# A steady input: of this many last periods, or at least half as many, most are about as long as their median ...
+# A steady input: of this many last periods, most are about as long as their median, if there are half as many ...
 _LAST_PERIODS: Final = 40
 _ABOUT: Final = 0.25
 # ... and hardly any is far longer. Otherwise messages come several at a time.
 _FAR: Final = 4
 _HARDLY: Final = 0.1
-# Of other periods a quarter would be this near to a multiple.
-_WHOLE: Final = 0.125
+# Or most are so near to whole multiples of the shortest that it is no chance.
 _MOSTLY: Final = 0.8
+_BY_CHANCE: Final = 1e-4
+# How near they are is known no better than this.
+_NEAR: Final = 0.01
 # Messages closer together than this came at once.
 _LEAST_PERIOD: Final = 1_000_000
 
 
-def steady_period(received: Sequence[int]) -> float | None:
+def steady_period(times: Sequence[int]) -> float | None:
     """Return the period of messages that come at a steady pace, but for pauses and what was lost; None of others.
 
     All times are in nanoseconds.
     """
-    last = received[-_LAST_PERIODS - 1 :]
+    last = times[-_LAST_PERIODS - 1 :]
     periods = sorted(map(sub, last[1:], last))
-    if len(periods) < _LAST_PERIODS // 2:
+    if not periods:
         return None
     usual = periods[len(periods) // 2]
     far = periods[round((1 - _HARDLY) * (len(periods) - 1))]
     if usual < _LEAST_PERIOD or far > _FAR * usual:
         return None
     near = _about(usual, periods)
-    if 2 * len(near) > len(periods):
+    if 2 * len(near) > len(periods) >= _LAST_PERIODS // 2:
         return sum(near) / len(near)
     # Where messages are lost at random, most periods are whole multiples of the shortest.
-    near = _about(periods[len(periods) // 4], periods)
-    base = near[len(near) // 2]
-    if base < _LEAST_PERIOD:
+    short = periods[len(periods) // 4]
+    if short < _LEAST_PERIOD:
         return None
-    whole = sum(abs(each - round(each / base) * base) <= _WHOLE * base for each in periods if each <= _FAR * base)
-    return sum(near) / len(near) if whole >= _MOSTLY * len(periods) else None
+    near = _about(short, periods)
+    base = sum(near) / len(near)
+    off = sorted(abs(each / base - round(each / base)) for each in periods if each <= _FAR * base)
+    most = ceil(_MOSTLY * len(periods))
+    if most > len(off):
+        return None
+    # One of them is what the others are measured by.
+    return base if _chance(most - 1, len(periods) - 1, 2 * max(off[most - 1], _NEAR)) < _BY_CHANCE else None
+
+
+def _chance(least: int, of: int, share: float) -> float:
+    """Return how likely it is that of so many, each of which is so likely, at least so many are."""
+    if share >= 1:
+        return 1.0
+    return sum(comb(of, count) * share**count * (1 - share) ** (of - count) for count in range(least, of + 1))
 
 
 def _about(period: float, periods: Sequence[int]) -> Sequence[int]:
@@ -114,9 +131,14 @@ class PaceWatch:
         self._paces.clear()
         self.slowed_from = None
 
-    def observe(self, times: Sequence[int]) -> None:
-        """Take the stamps of the last messages, or when they were received, in nanoseconds."""
-        last = times[-_PERIODS - 1 :]
+    def observe(self, times: Sequence[int], fresh: int) -> None:
+        """Take the stamps of the last messages, or when they were received, in nanoseconds; so many are new."""
+        # Of an input that has just begun, what came since the last look may show several paces.
+        parts = max(1, min(fresh // _LATEST, _SOON_PACES - len(self._paces)))
+        for end in range(len(times) - _LATEST * (parts - 1), len(times) + 1, _LATEST):
+            self._follow(times[max(0, end - _PERIODS - 1) : end])
+
+    def _follow(self, last: Sequence[int]) -> None:
         self.may_be_slower = False
         if len(last) <= _PERIODS:
             self.now_hz = 0.0

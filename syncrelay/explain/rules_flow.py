@@ -16,8 +16,8 @@ _PAUSE_PERIODS: Final = 3
 _CHECK_NETWORK: Final = "check the network and the CPU load"
 # As many as Fast DDS keeps with keep_all.
 _MOST_KEPT: Final = 5000
-# Reliable publishers send what the relay missed in a standstill again within this time.
-_SENT_AGAIN: Final = 4 * SECOND
+SENT_AGAIN: Final = 4 * SECOND
+"""Reliable publishers send what the relay missed in a standstill again within this time."""
 
 
 def bursts(facts: GroupFacts) -> Found:
@@ -126,8 +126,8 @@ def waited_for_relay(facts: GroupFacts) -> tuple[int, int]:
 
 
 def stood_still_until(facts: GroupFacts) -> int | None:
-    """Return until when messages may have been missed while the relay stood still. None where it did not."""
-    return max((each.until + _SENT_AGAIN for each in facts.standstills if each.ns >= _TOO_SLOW), default=None)
+    """Return until when the relay last stood still. None where it did not."""
+    return max((each.until for each in facts.standstills if each.ns >= _TOO_SLOW), default=None)
 
 
 def _overlapped(facts: GroupFacts, inputs: Iterable[Iterable[tuple[int, int]]]) -> int:
@@ -145,7 +145,7 @@ def _pauses(facts: GroupFacts, an_input: InputFacts) -> Iterator[tuple[int, int]
     longest = _PAUSE_PERIODS * (round(SECOND / figures.usual_hz) if figures.usual_hz else SECOND)
     yield from ((one, other) for one, other in pairwise(figures.received) if other - one > longest)
     if (last := figures.last_received) is not None and any(
-        each.earliest - longest <= last <= each.until < now <= each.until + _SENT_AGAIN for each in facts.standstills
+        each.earliest - longest <= last <= each.until < now <= each.until + SENT_AGAIN for each in facts.standstills
     ):
         yield last, now
 

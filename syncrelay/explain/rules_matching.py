@@ -1,7 +1,7 @@
 """Findings about matching: sets too wide, queues too short, optional inputs left out, sets that do not leave."""
 
 from collections.abc import Callable
-from itertools import combinations
+from itertools import combinations, groupby
 from statistics import median_low
 from typing import Final
 
@@ -28,6 +28,8 @@ _MISSED: Final = 0.05
 _FEWEST: Final = 5
 # Where no set leaves, and none of so few could, that is why.
 _FEWEST_OF_NONE: Final = 3
+# So unlikely is chance.
+_BY_CHANCE: Final = 0.001
 # Where messages were held up, wide spans say something about slop only if most are wide.
 _MOST: Final = 0.5
 _MISSING: Final = 0.05
@@ -44,7 +46,7 @@ _WATCHED: Final = 10 * SECOND
 # Stamps a constant distance apart may pair wrong messages: at least this many, at least this share of a period apart,
 # of rates that differ by no more than this share, scattering by no more than this share of a period, and within this
 # share of a whole number of periods by their times of receipt.
-_ENOUGH: Final = 20
+ENOUGH: Final = 20
 _OFF: Final = 0.15
 _SAME_RATE: Final = 0.05
 _SCATTERS: Final = 0.25
@@ -70,6 +72,8 @@ def over_slop(facts: GroupFacts) -> Found:
         return
     over = nearest.share_over(tolerance.ns)
     if not facts.has_stopped:
+        if is_near_again(facts):
+            return
         # What was so a while ago, as while an input was away, is no more.
         lately = facts.figures.nearest_lately or nearest
         over = min(over, lately.share_over(tolerance.ns))
@@ -94,6 +98,20 @@ def over_slop(facts: GroupFacts) -> Found:
     if odd is not None:
         text += f"; it is {facts.inputs[odd].name} that is off, the others are near each other"
     yield Fault(text, _advice(facts, found) or check, severity)
+
+
+def is_near_again(facts: GroupFacts) -> bool:
+    """Whether the newest messages all have a near partner, and so many of them that the others are of the past."""
+    tolerance, spans = facts.tolerance, facts.figures.nearest.newest(len(facts.figures.nearest))
+    if tolerance is None:
+        return False
+    if not spans or spans[0] > tolerance.ns:
+        return False
+    newest, *before = [len(list(run)) for is_near, run in groupby(spans, lambda each: each <= tolerance.ns) if is_near]
+    # By the rule of succession: a few that were far do not show that all are.
+    over = (sum(each > tolerance.ns for each in spans) + 1) / (len(spans) - newest + 2)
+    # Where clocks drift through each other, they are near again and again.
+    return (1 - over) ** newest < _BY_CHANCE and newest > 2 * max(before, default=0)
 
 
 def _odd_one(facts: GroupFacts) -> int | None:
@@ -197,7 +215,7 @@ def _whole_periods_off(facts: GroupFacts, first: int, other: int) -> int | None:
         return None
     stamps = (shifted(np.array(each.figures.stamps, dtype=np.int64), each.offset) for each in (one, two))
     signed = signed_distances(*map(np.sort, stamps))
-    if len(signed) < _ENOUGH or quantile(signed, 0.95) - quantile(signed, 0.05) > _SCATTERS * period:
+    if len(signed) < ENOUGH or quantile(signed, 0.95) - quantile(signed, 0.05) > _SCATTERS * period:
         return None
     distance = quantile(signed, 0.5)
     later = (two.figures.delay or 0) - two.offset - (one.figures.delay or 0) + one.offset

@@ -14,6 +14,7 @@ from syncrelay.explain.epochs import time_scale
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.figures import InputFigures
 from syncrelay.explain.findings import SECOND, Fault, Found, blocks, counted, nodes, written
+from syncrelay.explain.input_observation import WINDOW_NS
 from syncrelay.explain.other_stamps import by_offset_of_clock, offered_stamps
 from syncrelay.explain.rules_flow import waited_for_relay
 from syncrelay.explain.standing import Standing
@@ -44,6 +45,9 @@ _MATTERS: Final = 0.5
 _SAME_OFFSET: Final = 0.1
 # Stamps of inputs that run this much alike are of one clock.
 _SAME_RATE: Final = 0.05
+# Sets are looked for about once a second. They have ceased to leave when so many are missing.
+_LOOK: Final = round(1.1 * SECOND)
+_FEW_SETS: Final = 3
 _SLEW: Final = "check what set the clock {where}; NTP and chrony can be told to slew it instead"
 
 
@@ -279,13 +283,21 @@ def clock_step(facts: GroupFacts) -> Found:
         an_input = facts.inputs[index]
         # What does not run as time does steps all the time.
         if an_input.figures.reading is None and is_told(facts, step):
+            is_harmful = _left_until(facts, step.at)
             yield Fault(
                 f"stamps of {an_input.name} jumped {_forward(step.by)}, {_ago(now, step.at)}"
                 f"{_of_others(facts, index, step.at)}",
                 _SLEW.format(where=f"of {nodes(an_input)}") + offered_stamps(facts, Code.CLOCK_STEP, index),
-                blocks(facts, an_input),
+                blocks(facts, an_input) if is_harmful else Severity.OK,
                 input=index,
+                explains=is_harmful,
             )
+
+
+def _left_until(facts: GroupFacts, at: int) -> bool:
+    """Whether sets left until a time: what happened where none did has not cost any, and may have mended something."""
+    few = round(_FEW_SETS * SECOND / facts.possible_hz) if facts.possible_hz else 0
+    return any(0 <= at - seen <= _LOOK + few for seen in facts.figures.left_at)
 
 
 def is_told(facts: GroupFacts, step: Step) -> bool:
@@ -347,7 +359,13 @@ def out_of_order(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     count = an_input.figures.out_of_order if an_input.figures.faulty_looks > 1 else 0
     if facts.by_stamp and count > _FAULTY * an_input.figures.fed:
         text = f"{counted(count, an_input.figures.fed)} messages of {an_input.name} arrived out of stamp order"
-        yield Fault(text, f"check how {nodes(an_input)} stamps and sends")
+        yield Fault(text, f"check how {nodes(an_input)} stamps and sends", explains=_cost_sets(facts, count))
+
+
+def _cost_sets(facts: GroupFacts, count: int) -> bool:
+    """Whether so many messages of the window, of which each costs a set at most, account for most missing sets."""
+    share = facts.figures.share
+    return 0 < share.possible - share.left <= 2 * count * max(1.0, share.ns / WINDOW_NS)
 
 
 def duplicates(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeAlias
 
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
@@ -19,7 +19,7 @@ _FEWEST: Final = 10
 _LEAST_NS: Final = 2_500_000_000
 _ENOUGH_TO_TELL: Final = 30
 # Below this share a group gives too few sets, until the share is above the other bound.
-_FEW: Final = 0.8
+FEW: Final = 0.8
 BACK: Final = 0.95
 """The share at which few sets are enough again."""
 # A silence ends at this share: a single stray set in 5 s is at most a third of the possible ones.
@@ -74,6 +74,9 @@ class Share:
 
 
 NOT_KNOWN: Final = Share()
+
+Shares: TypeAlias = Callable[[int], Share]
+"""The share since a time within the window."""
 
 
 class Pace(NamedTuple):
@@ -130,6 +133,7 @@ class ShareWindow:
         self._is_pausing: list[bool] = []
         self._paced: set[int] = set()
         self._has_clock = False
+        self._have_all_come = False
 
     def clear(self) -> None:
         """Start afresh: a clock was set, or nothing was fed for a while."""
@@ -141,8 +145,9 @@ class ShareWindow:
     ) -> None:
         """Take the counts as they are now; `clock` is the time by which sets are made, where it is not `now`."""
         had_clock, self._has_clock = self._has_clock, clock is not None
-        if had_clock is not self._has_clock or not self._have_come(paces):
-            # Nothing is known to lie between the times of two clocks.
+        had_all_come, self._have_all_come = self._have_all_come, self._have_come(paces)
+        if had_clock is not self._has_clock or not had_all_come:
+            # Nothing is known to lie between the times of two clocks. What came before the last input did makes no set.
             self._polls.clear()
         elif self._ticks_hz is not None and self._polls and not self._polls[-1].sets:
             # Nothing counts the ticks before the first set, so the window begins with that set.
@@ -168,6 +173,15 @@ class ShareWindow:
     def _have_come(self, paces: Sequence[Pace]) -> bool:
         have = [pace.first is not None for pace in paces]
         return all(have[index] for index in self._enough(have))
+    def shares(self) -> Shares:
+        """Return the shares of all that the window can be divided into, as it is now."""
+        polls = tuple(self._polls)
+
+        def since(at: int) -> Share:
+            first = next((each for each in polls if each.at >= at), None)
+            return NOT_KNOWN if first is None else self._between(first, polls[-1])
+
+        return since
 
     def _owed(self, fed: tuple[int, ...], paces: Sequence[Pace], now: int) -> tuple[float, ...]:
         """Return how many messages each input should have sent by now; while all are away, nothing is owed."""
@@ -197,7 +211,9 @@ class ShareWindow:
             self._polls[number] = poll._replace(owed=(*poll.owed[:place], owed, *poll.owed[place + 1 :]))
 
     def _since(self, first: _Poll) -> Share:
-        last = self._polls[-1]
+        return self._between(first, self._polls[-1])
+
+    def _between(self, first: _Poll, last: _Poll) -> Share:
         left, ns = last.sets - first.sets, last.at - first.at
         if self._ticks_hz is not None:
             elapsed = last.clock - first.clock
@@ -220,7 +236,7 @@ class ShareWindow:
     def _due(place: int, first: _Poll, last: _Poll) -> tuple[int, int]:
         """Return how many sets an input allows, and how many of its messages are absent."""
         # Messages that were buffered before the first poll count for the time before it.
-        gone = min(last.gone[place] - first.gone[place], last.taken[place] - first.taken[place])
+        gone = max(0, min(last.gone[place] - first.gone[place], last.taken[place] - first.taken[place]))
         thinned = last.thinned[place] - first.thinned[place]
         owed = int(last.owed[place] - first.owed[place])
         absent = owed - (last.fed[place] - first.fed[place])
@@ -249,7 +265,7 @@ class StandingWatch:
         if is_silent:
             self.now = Standing.NONE
         elif value is not None and not (share.is_pausing and self.now is Standing.ENOUGH):
-            if value >= BACK or (value >= _FEW and self.now is Standing.ENOUGH):
+            if value >= BACK or (value >= FEW and self.now is Standing.ENOUGH):
                 self.now = Standing.ENOUGH
             elif self.now is Standing.ENOUGH or value >= _AGAIN:
                 self.now = Standing.FEW

@@ -7,6 +7,7 @@ import pytest
 
 from tests.bank.kinds import KINDS
 from tests.bank.looks import look, names_the_cause
+from tests.bank.mended import mended
 from tests.bank.play import Score, drawn, play
 from tests.faults.extent import chosen
 
@@ -15,6 +16,8 @@ _TOLD = 0.94
 _WELL = 0.99
 # Most that fail are offsets and slops for stamps that are near half a period off: which of two partners is right?
 _CURED = 0.98
+# Of faults beside another that was named and then mended: those that are named in time after that.
+_THEN_TOLD = 0.86
 # Of groups that lack sets: those that `observe` and `doctor` do not call healthy.
 _STOPPED = 0.98
 # Of faults that could be seen by then: those that both name.
@@ -66,6 +69,25 @@ def test_who_looks_for_10_s_calls_no_group_healthy_that_lacks_sets_and_names_the
     assert [draw.seed for draw, each in looks if each.said.code.value not in each.diagnosed and not each.is_ok] == []
     assert len(passed) <= _missed(_STOPPED, len(short)), passed
     assert len(missed) <= _missed(_NAMED, len(named)), missed
+
+
+@pytest.mark.long
+def test_of_two_faults_one_is_named_and_the_other_once_that_one_is_mended(figures):
+    count = chosen(short=30, long=1000)
+    results = [play(drawn(seed, tuple(KINDS), 2)) for seed in range(_FIRST, _FIRST + count)]
+    missed = [
+        (each.drawn.seed, each.drawn.kinds, each.score.value, each.why)
+        for each in results
+        if each.score is not Score.TOLD
+    ]
+    after = [then for each in results if (then := mended(each.drawn, each)) is not None]
+    lost = [(each.draw.seed, each.draw.kinds, each.why) for each in after if each.result.score is not Score.TOLD]
+    figures(
+        f"of {count} pairs of faults, one was named in {count - len(missed)}; of {len(after)} of which it was mended,"
+        f" the other was named in time in {len(after) - len(lost)}"
+    )
+    assert len(missed) <= _missed(_TOLD, count), missed
+    assert len(lost) <= _missed(_THEN_TOLD, len(after)), lost
 
 
 @pytest.mark.long

@@ -166,7 +166,7 @@ def test_the_cause_of_all_errors_of_a_silent_group_is_the_error():
 
 
 def test_an_explained_cause_explains_all_the_same():
-    stepped = camera(figures={"stepped": Step(NOW - S, -3 * S), "delay": 3 * S})
+    stepped = camera(figures={"stepped": Step(NOW - 6 * S, -3 * S), "delay": 3 * S})
     assert codes(judge(a_silent_group(stepped, LIDAR, waited=S))) == [Code.TOO_SLOW]
 
 

@@ -69,8 +69,13 @@ def seen(*, publishers: Any = TWO[:1], **figures: Any) -> Any:
 
 def spans(over: int, of: int) -> dict[str, Any]:
     """Figures of sets of which so many are wider than slop."""
-    measured = Distribution([30 * MS] * over + [5 * MS] * (of - over))
+    measured = Distribution([5 * MS] * (of - over) + [30 * MS] * over)
     return {"nearest": measured, "nearest_since": measured}
+
+
+def near_again(count: int) -> dict[str, Any]:
+    """Figures of many sets that were wider than slop, and so many since that are not."""
+    return {"nearest": Distribution([30 * MS] * 20 + [5 * MS] * count)}
 
 
 def wide(*each: int) -> Any:
@@ -186,7 +191,8 @@ def still_too_wide(left: int) -> bool:
     a_judge, half = Judge(), {**spans(50, 100), "share": Share(50, 100, 10 * S)}
     for _ in range(2):
         assert len(a_judge.judge(a_group(figures=half, standing=Standing.FEW))) == 1
-    found = a_judge.judge(a_group(figures={"share": Share(left, 100, 10 * S)}, standing=Standing.FEW))
+    hardly = {**spans(3, 100), "share": Share(left, 100, 10 * S)}
+    found = a_judge.judge(a_group(figures=hardly, standing=Standing.FEW))
     return Code.OVER_SLOP in {each.code for each in found}
 
 
@@ -245,7 +251,7 @@ def slowed(*periods: int) -> bool:
     """Whether an input that has sent with each of these periods has slowed."""
     pace = PaceWatch()
     for each in periods:
-        pace.observe([BEGAN + n * each for n in range(21)])
+        pace.observe([BEGAN + n * each for n in range(21)], 1)
     return pace.slowed_from is not None
 
 
@@ -267,6 +273,8 @@ def is_steady(*periods: int) -> bool:
 
 
 # From one end, where it is not so, to the other, where it is: the first value at which it is so.
+# Most are about as long, and no more.
+_UNEVEN = [8, 9, 10, 11, 12] * 8
 LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     # A group is silent after 5 s, or after three sets that should have come.
     "silent after 5 s": (0, 60 * S, 5 * S, silent_after()),
@@ -324,6 +332,7 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "all over slop": (0, 100, 96, lambda n: told(wide(*[60 * MS] * n, *[MS] * (100 - n)), Code.OVER_SLOP)),
     "some over slop": (0, 100, 6, lambda n: told(a_group(figures=spans(n, 100)), Code.OVER_SLOP)),
     "more than chance": (0, 20, 3, lambda n: told(a_group(figures=spans(n, 20)), Code.OVER_SLOP)),
+    "near again": (0, 20, 3, lambda n: not told(a_group(figures=near_again(n)), Code.OVER_SLOP)),
     "most over slop": (0, 100, 51, lambda n: told(a_group(BURSTING, LIDAR, figures=spans(n, 100)), Code.OVER_SLOP)),
     "a queue too short": (0, 99, 11, lambda n: told(a_silent_group(overflowing(n), LIDAR), Code.SHORT_QUEUE)),
     "missed for a queue": (1000, 0, 949, lambda hz: told(overflows(hz / 100), Code.SHORT_QUEUE)),
@@ -370,7 +379,9 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "steady but for": (9, 0, 2, lambda n: slowed(*[100 * MS] * (20 - n), *[10 * MS] * n, S)),
     "rate of a window": (0, 9, 5, lambda n: rates(20, n)[0] == 2 * n),
     "rate of messages": (0, 9, 5, lambda n: rates(n, n)[1] > 0),
-    "periods to tell": (0, 40, 20, lambda n: is_steady(*[10 * MS] * n)),
+    "periods to tell": (0, 40, 4, lambda n: is_steady(*[10 * MS] * n)),
+    "periods to tell of any": (0, 40, 18, lambda n: is_steady(*[MS * each for each in _UNEVEN[:n]])),
+    "whole multiples": (5 * MS, 0, 564_842, lambda by: is_steady(*[10 * MS] * 4, *[20 * MS + by] * 3)),
     "about as long": (0, 10 * MS, 7_500_000, lambda by: is_steady(*[by] * 8, *[10 * MS] * 15, *[25 * MS] * 8)),
     "no longer": (20 * MS, 10 * MS, 12_500_000, lambda by: is_steady(*[MS] * 8, *[10 * MS] * 15, *[by] * 8)),
     "most about as long": (10, 20, 11, lambda n: is_steady(*[10 * MS] * n, *[25 * MS] * (20 - n))),

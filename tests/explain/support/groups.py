@@ -72,4 +72,5 @@ def a_group(*inputs, figures=None, **facts):
 
 def a_silent_group(*inputs, figures=None, **facts):
     """The same after seven seconds without a set."""
-    return a_group(*inputs, figures={"rate_hz": 0.0, "last_set": NOW - 7 * S, **(figures or {})}, **facts)
+    left = {"rate_hz": 0.0, "last_set": NOW - 7 * S, "left_at": [NOW - n * S for n in range(60, 6, -1)]}
+    return a_group(*inputs, figures={**left, **(figures or {})}, **facts)
