@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Iterator
 
 from syncrelay.explain import Code, Severity
+from syncrelay.explain.causes import EXPLAINS
 from syncrelay.explain.codes import MATCHING
-from syncrelay.explain.judge import EXPLAINS
 
 # As programs get them: in /status, in the metrics, in `analyze --json`.
 _OK, _WARN, _ERROR = (f"`{severity.name.lower()}`" for severity in Severity)

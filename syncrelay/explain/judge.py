@@ -13,10 +13,9 @@ said and suggests nothing, while its cause holds and until the messages of that 
 - If all errors of a silent group are explained, their cause is the error.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
-from math import inf
-from typing import Final, NamedTuple
+from typing import Final
 
 from syncrelay.explain import (
     rules_clock,
@@ -28,13 +27,26 @@ from syncrelay.explain import (
     rules_transforms,
     words,
 )
-from syncrelay.explain.codes import MATCHING, Code, Of, Severity, codes_of
+from syncrelay.explain.causes import (
+    EXPLAINS,
+    OF_CLOCKS,
+    SEEN_SINCE,
+    SETTLES,
+    Cause,
+    effects_until,
+    ended,
+    explained_by,
+    is_aside,
+    most_missed,
+    over_since,
+    seen_since,
+)
+from syncrelay.explain.codes import MATCHING, Code, Of, Severity
 from syncrelay.explain.facts import GroupFacts
-from syncrelay.explain.findings import SECOND, Finding, Rule, of_each_input
+from syncrelay.explain.findings import Finding, Rule, of_each_input
 from syncrelay.explain.input_observation import WINDOW_NS
 from syncrelay.explain.known_soon import known_soon
 from syncrelay.explain.standing import BACK, FEW, Standing
-from syncrelay.sync.messages import DropReason
 
 _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     Rule(Code.INTERNAL_ERROR, rules_graph.internal_error),
@@ -83,134 +95,14 @@ _OTHER_RULES: Final[tuple[Rule, ...]] = (
     of_each_input(Code.SUBSCRIBER_QOS, rules_graph.subscriber_qos),
     of_each_input(Code.OUTPUT_TAKEN, rules_graph.output_taken),
 )
-# A cause is seen to be over at the next look. By then, what it has left in queues is gone.
-_SETTLES: Final = round(1.1 * SECOND)
-# So many messages in a row without a fault show that it is over.
-_NO_MORE: Final = 3
 _FEW_SETS: Final = Rule(Code.FEW_SETS, rules_matching.few_sets)
-
-
-class _Explained(NamedTuple):
-    """What a finding explains: in the whole group, and only where it is about the same input."""
-
-    in_group: frozenset[Code]
-    of_input: frozenset[Code] = frozenset()
-
-
-_ORDER: Final = codes_of(Of.ORDER)
-_FLOW: Final = codes_of(Of.MESSAGES, Of.ORDER, Of.MATCHING) | {Code.NO_CLOCK}
-"""What messages tell, and not the graph."""
-
-_COUNTED: Final = {
-    Code.MALFORMED: DropReason.MALFORMED,
-    Code.UNSTAMPED: DropReason.UNSTAMPED,
-    Code.DUPLICATES: DropReason.DUPLICATE,
-}
-_OF_CLOCKS: Final = frozenset({Code.OTHER_CLOCK, Code.CLOCK_STEP, Code.CLOCK_DRIFT})
-
-# What can be mended before the node is activated.
-_SAID_OF_THE_INACTIVE: Final = frozenset(
-    {Code.INTERNAL_ERROR, Code.INACTIVE, Code.TYPE_NOT_IMPORTABLE, Code.OTHER_TYPE, Code.SEVERAL_TYPES}
-)
-
-EXPLAINS: Final[Mapping[Code, _Explained]] = {
-    Code.INTERNAL_ERROR: _Explained(MATCHING),
-    # Stamps that are not set are seen by what the policy drops for them.
-    Code.PAUSED: _Explained(MATCHING | {Code.UNSTAMPED}),
-    Code.INACTIVE: _Explained(frozenset(Code) - _SAID_OF_THE_INACTIVE),
-    Code.ALONE: _Explained(MATCHING | {Code.NO_PUBLISHER, Code.NO_CLOCK}),
-    Code.NO_PUBLISHER: _Explained(MATCHING),
-    Code.TYPE_NOT_IMPORTABLE: _Explained(MATCHING),
-    Code.OTHER_TYPE: _Explained(MATCHING),
-    Code.SEVERAL_TYPES: _Explained(MATCHING),
-    Code.INCOMPATIBLE_QOS: _Explained(MATCHING),
-    Code.NOBODY_LISTENS: _Explained(_FLOW),
-    Code.NO_CLOCK: _Explained(frozenset({Code.SILENT, Code.WAITING_FOR_OPTIONAL, Code.FEW_SETS, Code.UNEXPLAINED})),
-    Code.CLOCK_STOPPED: _Explained(MATCHING | {Code.SILENT, Code.SLOWED}),
-    Code.TOO_SLOW: _Explained(
-        MATCHING | {Code.SILENT, Code.BURSTS, Code.MESSAGES_LOST, Code.CLOCK_DRIFT, Code.CLOCK_STEP}
-    ),
-    Code.SILENT: _Explained(MATCHING),
-    Code.MALFORMED: _Explained(MATCHING),
-    Code.UNSTAMPED: _Explained(MATCHING),
-    Code.SEVERAL_PUBLISHERS: _Explained(
-        MATCHING | {Code.OTHER_CLOCK}, _ORDER | {Code.CLOCK_STEP, Code.CLOCK_DRIFT, Code.SLOWED, Code.BURSTS}
-    ),
-    Code.TIME_JUMP: _Explained(
-        MATCHING | {Code.OTHER_CLOCK},
-        frozenset({Code.OUT_OF_ORDER, Code.DUPLICATES, Code.CLOCK_DRIFT, Code.SLOWED, Code.BURSTS}),
-    ),
-    Code.CLOCK_STEP: _Explained(MATCHING | {Code.OTHER_CLOCK, Code.CLOCK_DRIFT}, _ORDER | {Code.BURSTS}),
-    Code.CLOCK_DRIFT: _Explained(MATCHING | {Code.OTHER_CLOCK}),
-    Code.OTHER_CLOCK: _Explained(MATCHING, frozenset({Code.DUPLICATES, Code.OUT_OF_ORDER, Code.SLOWED, Code.BURSTS})),
-    Code.SLOWED: _Explained(MATCHING),
-    Code.BURSTS: _Explained(frozenset({Code.SHORT_QUEUE, Code.FEW_SETS, Code.UNEXPLAINED})),
-    Code.MESSAGES_LOST: _Explained(
-        frozenset({Code.OVER_SLOP, Code.FEW_SETS, Code.UNEXPLAINED}), frozenset({Code.BURSTS})
-    ),
-    Code.OUT_OF_ORDER: _Explained(frozenset({Code.OVER_SLOP, Code.FEW_SETS, Code.UNEXPLAINED})),
-    Code.DUPLICATES: _Explained(frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET, Code.FEW_SETS, Code.UNEXPLAINED})),
-}
-"""Causes, and which other findings they explain. No chain of explanations comes back to where it began."""
-
-
-def explained_by(code: Code) -> frozenset[Code]:
-    """Return what a finding of this code may explain."""
-    explained = EXPLAINS.get(code)
-    return explained.in_group | explained.of_input if explained else frozenset()
-
-
-def _first_step(facts: GroupFacts) -> int:
-    steps = (each.figures.stepped for each in facts.inputs)
-    told = (step.at for step in steps if step and rules_stamps.is_told(facts, step))
-    return min(told, default=facts.figures.now)
-
-
-def _faulty_since(facts: GroupFacts) -> int:
-    known = (each.figures.faulty_since for each in facts.inputs)
-    return max((at for at in known if at is not None), default=facts.figures.now - WINDOW_NS)
-
-
-_SEEN_SINCE: Final[Mapping[Code, Callable[[GroupFacts], int]]] = {
-    # That an input is silent is seen of now alone.
-    Code.SILENT: lambda facts: facts.figures.now,
-    # What the graph shows, it shows of now.
-    Code.NO_PUBLISHER: lambda facts: facts.figures.now,
-    Code.NO_CLOCK: lambda facts: facts.figures.now,
-    Code.OUT_OF_ORDER: _faulty_since,
-    Code.DUPLICATES: _faulty_since,
-    Code.OVER_SLOP: lambda facts: facts.figures.nearest_from,
-    Code.CONSTANT_OFFSET: lambda facts: min(
-        (each.figures.received[-rules_matching.ENOUGH :][0] for each in facts.inputs if each.figures.received),
-        default=facts.figures.now,
-    ),
-    Code.CLOCK_STEP: _first_step,
-    Code.BURSTS: lambda facts: max(
-        (begin for each in facts.inputs for begin, _ in each.figures.held_up), default=facts.figures.now
-    ),
-    Code.FEW_SETS: lambda facts: facts.figures.now - facts.figures.share.ns,
-}
-"""Since when the messages came that a finding judges by, where that is not the usual window."""
-
-
-class _Cause(NamedTuple):
-    """A cause, when it was last found, when it ended, and whether it was said then: nothing else explained it."""
-
-    finding: Finding
-    at: int
-    ended: int
-    most: float = inf
-    """How many sets it may have cost."""
-    was_said: bool = False
-    is_aside: bool = False
-    """Whether it is about an optional input, and no reason for what befalls the others."""
 
 
 class Judge:
     """Judges one group, poll by poll. Remembers causes that are over, as long as their effects may still be seen."""
 
     def __init__(self) -> None:
-        self._causes: dict[tuple[Code, int | None], _Cause] = {}
+        self._causes: dict[tuple[Code, int | None], Cause] = {}
         self._too_wide: Finding | None = None
         self._missing_since: int | None = None
 
@@ -266,28 +158,28 @@ class Judge:
             code
             for cause in self._causes.values()
             for code in explained_by(cause.finding.code)
-            if cause.at >= _seen_since(code, facts)
+            if cause.at >= seen_since(code, facts)
         )
 
     def _remember(self, found: Iterable[Finding], facts: GroupFacts) -> None:
         now = facts.figures.now
         if self._causes:
-            longest_ago = min([now - WINDOW_NS, *(seen_since(facts) for seen_since in _SEEN_SINCE.values())])
+            longest_ago = min([now - WINDOW_NS, *(since(facts) for since in SEEN_SINCE.values())])
             self._causes = {key: cause for key, cause in self._causes.items() if longest_ago <= cause.at <= now}
             # Whether a clock runs wrong is not known while it may have been set, and goes on until then.
             self._causes = {
                 key: cause._replace(ended=now) if any(facts.inputs[at].figures.may_step for at in about) else cause
                 for key, cause in self._causes.items()
-                for about in [cause.finding.about if cause.finding.code in _OF_CLOCKS else ()]
+                for about in [cause.finding.about if cause.finding.code in OF_CLOCKS else ()]
             }
         for finding in found:
             if finding.explains and finding.code in EXPLAINS:
-                self._causes[finding.code, finding.input] = _Cause(
+                self._causes[finding.code, finding.input] = Cause(
                     finding,
                     now,
-                    _ended(finding, facts),
-                    _most(finding, facts),
-                    is_aside=_is_aside(finding, facts),
+                    ended(finding, facts),
+                    most_missed(finding, facts),
+                    is_aside=is_aside(finding, facts),
                 )
 
     def _since_the_last_cause(self, facts: GroupFacts) -> GroupFacts:
@@ -299,7 +191,7 @@ class Judge:
     def _is_explained(self, code: Code, facts: GroupFacts) -> bool:
         """Whether a cause that holds now explains all findings of a code."""
         return any(
-            _effects_until(cause, code) >= facts.figures.now
+            effects_until(cause, code) >= facts.figures.now
             and code in EXPLAINS[cause.finding.code].in_group
             and (cause.finding.input is None or facts.inputs[cause.finding.input].required)
             for cause in self._causes.values()
@@ -357,7 +249,7 @@ class Judge:
                 return self._root(cause.finding, facts)
         return finding
 
-    def _explains(self, cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
+    def _explains(self, cause: Cause, finding: Finding, facts: GroupFacts) -> bool:
         if finding.code in MATCHING and self._is_spent(cause, facts):
             return False
         looks_back = finding.code is Code.FEW_SETS
@@ -373,30 +265,30 @@ class Judge:
         is_narrow = finding.code not in explained.in_group or cause.is_aside
         if is_narrow and about is not None and about != finding.input:
             return False
-        since = _seen_since(finding.code, facts)
+        since = seen_since(finding.code, facts)
         if finding.severity is Severity.ERROR and not looks_back:
             # A silence is told by what comes now, or does not: a cause that is long over is no reason for it.
             since = max(since, facts.figures.now - facts.silent_after)
         elif rules_matching.has_few_sets(facts):
             # Nor is it one for recently missing sets, however far back the stamps are compared.
-            since = max(since, _seen_since(Code.FEW_SETS, facts))
+            since = max(since, seen_since(Code.FEW_SETS, facts))
         # Nor is one that ended when fewer sets, or none, should have left since, however long it is remembered.
-        return _effects_until(cause, finding.code) >= since
+        return effects_until(cause, finding.code) >= since
 
-    def _is_spent(self, cause: _Cause, facts: GroupFacts) -> bool:
+    def _is_spent(self, cause: Cause, facts: GroupFacts) -> bool:
         """Whether a cause is over, and few of the sets that were possible since have left: for another reason."""
-        return self._missing_since is not None and _effects_until(cause, Code.FEW_SETS) < facts.figures.now
+        return self._missing_since is not None and effects_until(cause, Code.FEW_SETS) < facts.figures.now
 
     def _few_left_since(self, facts: GroupFacts) -> int | None:
         """Return since when no cause is known of those that keep sets from leaving, if few have left since then."""
         ends = [
-            _over_since(each, facts)
+            over_since(each, facts)
             for each in self._causes.values()
             if Code.FEW_SETS in explained_by(each.finding.code)
         ]
         if not ends:
             return None
-        since = max(ends) + _SETTLES
+        since = max(ends) + SETTLES
         share = facts.figures.shares(since).value
         return since if share is not None and share < FEW else None
 
@@ -409,51 +301,6 @@ def _is_why(finding: Finding) -> bool:
 def judge(facts: GroupFacts) -> tuple[Finding, ...]:
     """Return what `Judge` says of one moment, knowing nothing of what was before."""
     return Judge().judge(facts)
-
-
-def _most(finding: Finding, facts: GroupFacts) -> float:
-    """Return how many sets a cause may have cost where it was short: twice those of its time and of a second."""
-    lasted = max(rules_flow.waited_for_relay(facts)) / SECOND + 1
-    return 2 * (1 + lasted * facts.possible_hz) if finding.code is Code.TOO_SLOW else inf
-
-
-def _effects_until(cause: _Cause, code: Code) -> int:
-    """Return until when a cause had effects of a code."""
-    # What is sent again after a standstill comes late once, which makes no step.
-    lasts = cause.finding.code is Code.TOO_SLOW and cause.ended < cause.at and code is not Code.CLOCK_STEP
-    return cause.ended + rules_flow.SENT_AGAIN if lasts else cause.ended
-
-
-def _over_since(cause: _Cause, facts: GroupFacts) -> int:
-    """Return since when a cause can have had no more effect: its inputs flow, and are stamped as they are now."""
-    about = [facts.inputs[index].figures for index in cause.finding.about]
-    return max([_effects_until(cause, Code.FEW_SETS), *(max(each.flows_since or 0, each.changed_at) for each in about)])
-
-
-def _is_aside(finding: Finding, facts: GroupFacts) -> bool:
-    if finding.input is None or facts.inputs[finding.input].required:
-        return False
-    # An optional input whose stamps jump back and forth restarts the matching of all.
-    return not rules_stamps.swings(facts.inputs[finding.input])
-
-
-def _ended(finding: Finding, facts: GroupFacts) -> int:
-    """Return until when a cause that is found now held. What is counted is found for as long as it is counted."""
-    now = facts.figures.now
-    if finding.code is Code.TOO_SLOW:
-        return min(now, rules_flow.stood_still_until(facts) or now)
-    reason = _COUNTED.get(finding.code)
-    if finding.input is None or reason is None:
-        return now
-    figures = facts.inputs[finding.input].figures
-    last = figures.last_faults.get(reason, now)
-    # Of a slow input, the next may be as bad.
-    return last if (now - last) * figures.rate_hz > _NO_MORE * SECOND and now - last > _SETTLES else now
-
-
-def _seen_since(code: Code, facts: GroupFacts) -> int:
-    seen_since = _SEEN_SINCE.get(code)
-    return facts.figures.now - WINDOW_NS if seen_since is None else seen_since(facts)
 
 
 def with_ok(facts: GroupFacts, found: tuple[Finding, ...]) -> tuple[Finding, ...]:

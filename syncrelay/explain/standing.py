@@ -173,6 +173,7 @@ class ShareWindow:
     def _have_come(self, paces: Sequence[Pace]) -> bool:
         have = [pace.first is not None for pace in paces]
         return all(have[index] for index in self._enough(have))
+
     def shares(self) -> Shares:
         """Return the shares of all that the window can be divided into, as it is now."""
         polls = tuple(self._polls)

@@ -22,9 +22,9 @@ from syncrelay.explain import (
     judge,
     with_ok,
 )
+from syncrelay.explain.causes import EXPLAINS, explained_by
 from syncrelay.explain.clocks import Drift
 from syncrelay.explain.distribution import Distribution
-from syncrelay.explain.judge import EXPLAINS, explained_by
 from syncrelay.sync import Match, Message
 from syncrelay.sync.messages import DropReason
 from tests.explain.support.cases import LIDAR, QUIET, camera, dropped, overflowing, wide

@@ -3,7 +3,7 @@
 import pytest
 
 from syncrelay.explain import ClockState, Code, Finding, Severity, explanation, judge, with_ok
-from syncrelay.explain.judge import EXPLAINS
+from syncrelay.explain.causes import EXPLAINS
 from syncrelay.sync.messages import DropReason
 from tests.explain.support import cases_flow, cases_graph, cases_stamps, cases_transforms
 from tests.explain.support.cases import STRANGER, UNFIT, camera, fed, said_of_cases
