@@ -10,6 +10,7 @@ import random
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from heapq import merge
+from operator import itemgetter
 from typing import Any, TypedDict
 
 import yaml
@@ -166,11 +167,13 @@ def run(
     config = group_of(sources, options or {})
     names = [topic.topic for topic in config.topics]
     arrivals = merge(
-        *(_arrivals(each, names, seconds, _chance(seed, place, each)) for place, each in enumerate(sources))
+        *(_arrivals(each, names, seconds, _chance(seed, place, each)) for place, each in enumerate(sources)),
+        key=itemgetter(0, 1),
     )
     relay = _Relay(config, paused, hears)
     heard = (each for each in arrivals if _until(sleeps, each[0]) == each[0])
-    waiting = sorted((_until(stops, at), index, stamp) for at, index, stamp in heard)
+    # Of what comes at once on a topic, one may have no stamp that could be compared.
+    waiting = sorted(((_until(stops, at), index, stamp) for at, index, stamp in heard), key=itemgetter(0, 1))
     for index in (index for index, topic in enumerate(config.topics) if topic.stamp == "receive"):
         waiting = _stamped_by_receipt(waiting, index)
     place = 0
