@@ -20,7 +20,8 @@ HEADERS = tuple(Path("/usr/include/tf2", name) for name in ("buffer_core.h", "ti
 SETS_OF_A_WORLD = 25
 WORLDS = chosen(short=20, long=400)
 
-pytestmark = pytest.mark.peer
+# 10,000 sets take 4 min of a free core.
+pytestmark = [pytest.mark.peer, pytest.mark.timeout(1800)]
 
 
 @pytest.fixture
