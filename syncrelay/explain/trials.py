@@ -250,7 +250,7 @@ class Trials:
         if tolerance is not None and quantile(possible.spans, 0.99) > tolerance.ns and not self.pairs_neighbours:
             policies: list[Changes] = [(Change("policy", tolerance.wider_policy),)] if tolerance.wider_policy else [()]
             # With headroom, some sets may lose messages to those that are nearly as near.
-            for wider in self._tolerances(possible):
+            for wider in dict.fromkeys(self._tolerances(possible)):
                 yield from ((*policy, Change(tolerance.key, wider)) for policy in (*policies, *patient))
         if target is not REQUIRED and (late := self._lateness(target)) > 0:
             yield from _waits(late, 2 * late)
@@ -260,6 +260,9 @@ class Trials:
             yield from _waits(2 * options.max_wait, 4 * options.max_wait) if options.max_wait else ()
 
     def _tolerances(self, possible: PossibleSets) -> Sequence[str]:
+        if not self.is_window:
+            # A whole recording shows how far apart they come.
+            return (with_headroom(possible.spans), words.at_least(possible.widest))
         return tolerances(possible, [self.stamps(each) for each in possible.among], self.config.options.distance)
 
     def stamps(self, index: int) -> Nanoseconds:

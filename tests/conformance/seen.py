@@ -63,7 +63,7 @@ def _note(note: Sequence[Any]) -> str:
 
 
 def _short(said: Any) -> str:
-    return str(said).partition("\n")[0].replace("geometry_msgs/msg/", "").replace("'", "")
+    return " / ".join(map(str.strip, str(said).split("\n")[:2])).replace("geometry_msgs/msg/", "").replace("'", "")
 
 
 def message(content: bytes, begin: int) -> str:

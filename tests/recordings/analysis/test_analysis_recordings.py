@@ -52,7 +52,7 @@ _RIGS: Final = {
         topics=("/imu_data", "/magnetic_vector", "/gravity_vector"),
         delays_us={"/imu_data": (81_259, 681_362)},
         distances_us={("/imu_data", "/magnetic_vector"): (10, 11, 22), ("/imu_data", "/gravity_vector"): (11, 13, 23)},
-        options={"policy": "approximate_time", "slop": 22_000},
+        options={"policy": "approximate_time", "slop": 25_000},
     ),
     "vehicle, scan": Rig(
         bag=recordings.VEHICLE,
