@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from itertools import combinations, groupby
+from math import sqrt
 from statistics import median_low
 from typing import Final
 
@@ -81,8 +82,8 @@ def over_slop(facts: GroupFacts) -> Found:
     if facts.has_stopped and over > 1 - _MISSED:
         severity = Severity.ERROR if facts.is_silent else Severity.WARN
         text = _too_wide(facts, tolerance, nearest)
-    # What was held up may only seem far apart, and a wider slop would pair what came together. Two messages are chance.
-    elif not facts.has_stopped and over > max(_MOST if came_at_once else _MISSED, 2.5 / len(nearest)):
+    # What was held up may only seem far apart, and a wider slop would pair what came together.
+    elif not facts.has_stopped and over > (_MOST if came_at_once else _beyond_chance(_MISSED, len(nearest))):
         text, severity = _often_too_wide(facts, tolerance, nearest), Severity.WARN
     else:
         return
@@ -98,6 +99,11 @@ def over_slop(facts: GroupFacts) -> Found:
     if odd is not None:
         text += f"; it is {facts.inputs[odd].name} that is off, the others are near each other"
     yield Fault(text, _advice(facts, found) or check, severity)
+
+
+def _beyond_chance(share: float, count: int) -> float:
+    """Return what share of so many is more than this share of all by two standard errors, and more than two."""
+    return max(share + 2 * sqrt(share * (1 - share) / count), 2.5 / count)
 
 
 def is_near_again(facts: GroupFacts) -> bool:

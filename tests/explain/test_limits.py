@@ -330,7 +330,7 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "over slop": (0, 60 * MS, 20 * MS + 1, lambda by: told(wide(*[by] * 9), Code.OVER_SLOP)),
     "enough to tell": (0, 9, 3, lambda n: told(wide(*[60 * MS] * n), Code.OVER_SLOP)),
     "all over slop": (0, 100, 96, lambda n: told(wide(*[60 * MS] * n, *[MS] * (100 - n)), Code.OVER_SLOP)),
-    "some over slop": (0, 100, 6, lambda n: told(a_group(figures=spans(n, 100)), Code.OVER_SLOP)),
+    "some over slop": (0, 100, 10, lambda n: told(a_group(figures=spans(n, 100)), Code.OVER_SLOP)),
     "more than chance": (0, 20, 3, lambda n: told(a_group(figures=spans(n, 20)), Code.OVER_SLOP)),
     "near again": (0, 20, 3, lambda n: not told(a_group(figures=near_again(n)), Code.OVER_SLOP)),
     "most over slop": (0, 100, 51, lambda n: told(a_group(BURSTING, LIDAR, figures=spans(n, 100)), Code.OVER_SLOP)),
