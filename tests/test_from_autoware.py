@@ -87,6 +87,22 @@ def test_lidars_die_and_return_and_each_turn_is_one_set_of_those_that_are_there(
             assert all(match.stamp == min(each.stamp for each in match.messages if each) for _, match in left)
 
 
+def test_with_a_narrower_window_a_cloud_is_in_a_set_if_it_is_nearer_than_both_windows():
+    first = "top/pointcloud_before_sync, type: sensor_msgs/msg/PointCloud2, min_period: 60ms"
+    windows, clouds, expected = (5 * MS, 10 * MS), [], []
+    for turn in range(TURNS):
+        apart = turn * MS // 2
+        stamps = (BEGIN + turn * 100 * MS, BEGIN + turn * 100 * MS + OFFSETS[1] + apart)
+        clouds += [Message(lidar, stamp, stamps[1] + MS, key=turn) for lidar, stamp in enumerate(stamps)]
+        # What Autoware's own code compares; there, exactly that far apart is too far.
+        is_near = abs(stamps[0] - (stamps[1] - OFFSETS[1])) <= sum(windows)
+        expected += [(turn, turn, None)] if is_near else []
+    left = _sets(_ADVANCED.replace(first, first + ", tolerance: 5ms"), clouds)
+    sets = [tuple(each and each.key for each in match.messages) for _, match in left]
+    assert [turns for turns in sets if None not in turns[:2]] == expected
+    assert len(expected) == 31
+
+
 def test_a_cloud_that_comes_after_its_set_is_in_none():
     clouds = _clouds(random.Random(1), {}, by_arrival=False)
     late = [

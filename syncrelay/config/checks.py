@@ -40,6 +40,7 @@ def check_groups(groups: Sequence[GroupConfig], document: Document) -> Iterator[
         yield from _keys(group, document)
         yield from _optional_inputs(group, document)
         yield from _quorum(group, document)
+        yield from _tolerances(group, document)
         yield from _unit(group, document)
         yield from _unwritten_types(group, document)
 
@@ -260,6 +261,23 @@ def _quorum(group: GroupConfig, document: Document) -> Iterator[Problem]:
     elif not required and group.options.tolerance is None and group.options.distance is Distance.SPAN:
         text = "a quorum without a required input needs a `slop`: without one any messages belong together"
         yield document.problem(path, text, code="conflict")
+
+
+def _tolerances(group: GroupConfig, document: Document) -> Iterator[Problem]:
+    slop, is_of_any = group.options.tolerance, group.options.quorum is not None and not group.required
+    for (topic, _), own in zip(group.paths(), group.narrowed, strict=True):
+        path = (*topic, "tolerance")
+        if own is None or (*group.path, "quorum") in document.faulty:
+            continue
+        if not is_of_any:
+            text = (
+                "a tolerance is kept only where a set needs no input in particular: write a `quorum` and no `required:"
+                " true`, or leave it out"
+            )
+            yield document.problem(path, text, code="conflict")
+        elif slop is not None and 2 * own.ns >= slop.ns:
+            text = "no less than half the `slop`, so it changes nothing: write less, or a wider slop, or leave it out"
+            yield document.problem(path, text, code="conflict", severity=Severity.WARNING)
 
 
 def _unit(group: GroupConfig, document: Document) -> Iterator[Problem]:

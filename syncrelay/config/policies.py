@@ -39,6 +39,21 @@ Slop = Field(
 )
 
 
+class NearTopic(PacedTopic):
+    """An input of a policy that can allow for how far each input's stamps may be off."""
+
+    tolerance: Annotated[Duration | None, NOT_NULL] = Field(
+        default=None,
+        description=(
+            "How far stamps of this input may be off, if by less than half the group's `slop`: two messages of a set"
+            " are no farther apart than both may be off together. `slop` is needed too: it stays the largest span of a"
+            " set. Only in a group with a `quorum` and no required input. A number is seconds, a string has a unit"
+            " (ns, us, ms, s, min). Default: half the slop."
+        ),
+        examples=["5ms"],
+    )
+
+
 class SlopGroup(Group):
     """A group whose sets may be as wide as `slop`."""
 
@@ -88,7 +103,12 @@ class ApproximateTimeGroup(SlopGroup):
         ),
         examples=[0.1],
     )
-    topics: tuple[PacedTopic, ...] = Topics
+    topics: tuple[NearTopic, ...] = Topics
+
+    def tolerance_of(self, topic: Topic) -> Tolerance | None:
+        """Return the topic's own `tolerance`, else the group's slop."""
+        own = topic.tolerance if isinstance(topic, NearTopic) else None
+        return self.tolerance if own is None else Tolerance("tolerance", own)
 
     def build_policy(self, _inputs: Inputs) -> ApproximateTime:
         """Return a new policy of the engine."""
@@ -98,6 +118,7 @@ class ApproximateTimeGroup(SlopGroup):
             slop_ns=self.slop,
             age_penalty=self.age_penalty,
             min_periods_ns=tuple(topic.min_period for topic in self.topics),
+            tolerances_ns=tuple(topic.tolerance for topic in self.topics),
         )
 
 

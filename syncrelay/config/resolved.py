@@ -7,7 +7,7 @@ from syncrelay.clock import DeviceClock, Step
 from syncrelay.config.bundle import BundledInput, BundleKeys
 from syncrelay.config.file import FileKeys
 from syncrelay.config.listen import DEFAULT_HOST, DEFAULT_PORTS, Listen, parse_listen
-from syncrelay.config.models import Group, Inputs, PacedTopic, StampSource, Tolerance, Topic
+from syncrelay.config.models import Distance, Group, Inputs, PacedTopic, StampSource, Tolerance, Topic
 from syncrelay.config.names import default_output
 from syncrelay.config.problems import Path
 from syncrelay.config.qos import QosOverrides, QosPreset
@@ -130,7 +130,15 @@ class GroupConfig:
 
     @property
     def own_tolerances(self) -> tuple[Tolerance | None, ...]:
-        """The tolerance of each input; None for those that use the group's."""
+        """The tolerance that each input has instead of the group's; None for those that the group's is for."""
+        return (None,) * len(self.topics) if self.options.distance is Distance.SPAN else self._own()
+
+    @property
+    def narrowed(self) -> tuple[Tolerance | None, ...]:
+        """The tolerance that each input has beside the group's largest span; None for those that have none."""
+        return self._own() if self.options.distance is Distance.SPAN else (None,) * len(self.topics)
+
+    def _own(self) -> tuple[Tolerance | None, ...]:
         return tuple(None if each.tolerance == self.options.tolerance else each.tolerance for each in self.topics)
 
     def paths(self) -> Iterator[tuple[Path, TopicConfig]]:

@@ -157,7 +157,8 @@ class InputFacts:
 
     `type` is the file's, or else the graph's; None until it is known. `key` is the newest message's. `offset` is added
     to stamps for matching, in nanoseconds. `served_since` is since when without a break the graph has shown a publisher
-    whose messages can be received, None while it shows none. `own_tolerance` is what the file gives this input alone.
+    whose messages can be received, None while it shows none. `own_tolerance` is what the file gives this input in
+    place of the group's tolerance, and `narrowed` what it gives it beside.
     It is `required` if no set leaves without it. Where it is `in_quorum`, that goes by how many others come.
     """
 
@@ -170,6 +171,7 @@ class InputFacts:
     offset: int = 0
     served_since: int | None = None
     own_tolerance: Tolerance | None = None
+    narrowed: Tolerance | None = None
     in_quorum: bool = False
 
     @property

@@ -1,7 +1,7 @@
 """Findings about matching: sets too wide, queues too short, optional inputs left out, sets that do not leave."""
 
 from collections.abc import Callable
-from itertools import combinations, groupby
+from itertools import groupby
 from math import sqrt
 from statistics import median_low
 from typing import Final
@@ -12,6 +12,7 @@ from syncrelay.config import Distance, Tolerance
 from syncrelay.config.units import parse_duration
 from syncrelay.config.wording import all_of
 from syncrelay.explain import words
+from syncrelay.explain.apart import odd_one, over_tolerances
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.facts import GroupFacts, InputFacts
@@ -58,6 +59,7 @@ _PAUSE: Final = SECOND
 _PAUSE_PERIODS: Final = 5
 # What fills queues before all inputs have come says nothing of their size.
 _YOUNG: Final = 2 * SECOND
+_CHECK_TOLERANCES: Final = "check how these topics are stamped, or write a wider `tolerance`"
 # The keys that help where a queue overflowed, and where a message came too late for its set.
 _QUEUE: Final = frozenset({"queue_size"})
 _WAITING: Final = frozenset({"queue_size", "max_wait"})
@@ -70,6 +72,9 @@ def over_slop(facts: GroupFacts) -> Found:
     if tolerance is None or len(nearest) < (_FEWEST_OF_NONE if facts.has_stopped else _FEWEST):
         return
     if next(other_clock(facts), None):
+        return
+    if facts.has_stopped and (narrow := over_tolerances(facts)) is not None:
+        yield Fault(narrow, _CHECK_TOLERANCES, Severity.ERROR if facts.is_silent else Severity.WARN)
         return
     over = nearest.share_over(tolerance.ns)
     if not facts.has_stopped:
@@ -95,7 +100,7 @@ def over_slop(facts: GroupFacts) -> Found:
     if 0 < len(coarse) < len(facts.inputs):
         text += "".join(f"; stamps of {name} are multiples of {words.duration(unit)}" for name, unit in coarse.items())
         check = f"check whether {all_of(coarse)} rounds its stamps"
-    odd = _odd_one(facts) if facts.distance is Distance.SPAN else None
+    odd = odd_one(facts) if facts.distance is Distance.SPAN else None
     if odd is not None:
         text += f"; it is {facts.inputs[odd].name} that is off, the others are near each other"
     yield Fault(text, _advice(facts, found) or check, severity)
@@ -118,28 +123,6 @@ def is_near_again(facts: GroupFacts) -> bool:
     over = (sum(each > tolerance.ns for each in spans) + 1) / (len(spans) - newest + 2)
     # Where clocks drift through each other, they are near again and again.
     return (1 - over) ** newest < _BY_CHANCE and newest > 2 * max(before, default=0)
-
-
-def _odd_one(facts: GroupFacts) -> int | None:
-    """Return the input whose stamps lie off those of all others, which lie near each other; None if there is none."""
-    tolerance, required = facts.tolerance, [index for index, each in enumerate(facts.inputs) if each.required]
-    if tolerance is None or len(required) < 3:  # noqa: PLR2004  of two, either may be
-        return None
-    stamps = {
-        index: np.sort(
-            shifted(np.array(facts.inputs[index].figures.stamps, dtype=np.int64), facts.inputs[index].offset)
-        )
-        for index in required
-    }
-    far = []
-    for one, other in combinations(required, 2):
-        distances = signed_distances(*sorted((stamps[one], stamps[other]), key=len))
-        if len(distances) < _FEWEST_OF_NONE:
-            return None
-        if abs(quantile(distances, 0.5)) > tolerance.ns:
-            far.append({one, other})
-    odd = set.intersection(*far) if len(far) > 1 else set()
-    return odd.pop() if len(odd) == 1 and len(far) == len(required) - 1 else None
 
 
 def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
@@ -317,6 +300,8 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
             f": the nearest sets with it span {widths}, over {tolerance.key} {words.duration(tolerance.ns)}",
             _advice(facts, found, name) or f"check how {nodes(an_input)} stamps its messages",
         )
+    if (narrow := over_tolerances(facts, index)) is not None:
+        return f": {narrow}", _CHECK_TOLERANCES
     if facts.max_wait is not None and behind > facts.max_wait:
         found = _verdict(facts, about, lambda trials: trials.verdict(index, _WAITING))
         return (

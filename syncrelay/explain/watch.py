@@ -111,6 +111,7 @@ class GroupWatch:
             self._keys,
             self._served_since,
             self.config.own_tolerances,
+            self.config.narrowed,
             strict=True,
         )
         facts = GroupFacts(
@@ -129,8 +130,9 @@ class GroupWatch:
                     offset=topic.offset_ns,
                     served_since=since,
                     own_tolerance=own,
+                    narrowed=narrowed,
                 )
-                for index, (topic, shown, type_name, counts, seen, key, since, own) in enumerate(rows)
+                for index, (topic, shown, type_name, counts, seen, key, since, own, narrowed) in enumerate(rows)
             ),
             figures=figures,
             tolerance=options.tolerance,

@@ -31,6 +31,9 @@ class ApproximateTime(Queued):
     is the input whose head was the latest when a first candidate was found. The candidate is the best set with the
     pivot's message so far; it is always the front of the queues. Messages between it and the heads are skipped. They
     come back when it leaves.
+
+    `tolerances_ns` are for groups where no input is required; there OptionalInputs makes the sets. What is required is
+    matched by slop alone.
     """
 
     __slots__ = (
@@ -51,6 +54,7 @@ class ApproximateTime(Queued):
         "_scale",
         "_slop",
         "_stamps",
+        "_tolerances",
         "n_inputs",
         "waits_ended",
         "waits_started",
@@ -64,6 +68,7 @@ class ApproximateTime(Queued):
         slop_ns: int | None,
         age_penalty: float = 0.1,
         min_periods_ns: Sequence[int] | None = None,
+        tolerances_ns: Sequence[int | None] | None = None,
     ) -> None:
         periods = (0,) * n_inputs if min_periods_ns is None else tuple(min_periods_ns)
         self.make_queues(n_inputs, queue_size)
@@ -72,6 +77,10 @@ class ApproximateTime(Queued):
             raise ValueError(f"age_penalty {age_penalty} must be 0 or more")
         if len(periods) != n_inputs or any(period < 0 for period in periods):
             raise ValueError(f"min_periods_ns {periods} must be {n_inputs} numbers, 0 or more")
+        tolerances = (None,) * n_inputs if tolerances_ns is None else tuple(tolerances_ns)
+        if len(tolerances) != n_inputs or any(each is not None and each < 0 for each in tolerances):
+            raise ValueError(f"tolerances_ns {tolerances} must be {n_inputs} numbers, 0 or more, or None")
+        self._tolerances = tolerances
         self._age_penalty = age_penalty
         self._scale = (1.0 + age_penalty).as_integer_ratio()
         self._min_periods = periods
@@ -97,6 +106,7 @@ class ApproximateTime(Queued):
             queue_size=self._queue_size,
             slop_ns=self._slop,
             min_periods_ns=self._min_periods,
+            tolerances_ns=self._tolerances,
         )
         return policy, stage
 

@@ -12,11 +12,22 @@ from syncrelay.sync.waiting import OptionalStage, Seed, Waiting
 _EARLIEST: Final = -(2**63)
 
 
+class _Window(NamedTuple):
+    """How far before and after a stamp the moment of its message may be."""
+
+    before: int
+    after: int
+
+    def around(self, low: int, high: int) -> tuple[int, int]:
+        """Return the first and the last moment that messages from `low` to `high` share."""
+        return high - self.before, low + self.after
+
+
 class _Last(NamedTuple):
-    """The last set: the stamp that it was made round, the last stamp that would have fitted, its inputs."""
+    """The last set: the stamp that it was made round, the last moment that its messages share, its inputs."""
 
     stamp: int
-    reach: int
+    close: int
     inputs: frozenset[int]
 
 
@@ -31,6 +42,10 @@ class OptionalInputs(OptionalStage):
     the first of them in their order. So sets are made round the messages of the first input while these come. A message
     that is not newer than the one that the last set was made round is late, and those that the last set left without
     make none of their own.
+
+    There, an input may have one of `tolerances_ns`. The windows of a set's messages share a moment: a window reaches
+    from a stamp as far as the tolerance, but no farther than half of slop, as it does where there is none. So without
+    tolerances, the span of a set is at most slop; with them, two messages are at most both tolerances apart.
     """
 
     def __init__(
@@ -41,7 +56,10 @@ class OptionalInputs(OptionalStage):
         queue_size: int,
         slop_ns: int,
         min_periods_ns: Sequence[int] | None = None,
+        tolerances_ns: Sequence[int | None] | None = None,
     ) -> None:
+        if any(required) and any(tolerance is not None for tolerance in tolerances_ns or ()):
+            raise ValueError(f"tolerances_ns {tolerances_ns} must be None where an input is required: {required}")
         self.inputs = [index for index, needed in enumerate(required) if not needed]
         self.lacking = quorum - sum(required)
         self.queue_size = queue_size
@@ -49,6 +67,12 @@ class OptionalInputs(OptionalStage):
         self.came = {index: {} for index in self.inputs}
         self._queues = {index: StampQueue() for index in self.inputs}
         self._slop = slop_ns
+        # Of an odd slop, the nanosecond that is left counts after the stamp.
+        self._half = _Window(slop_ns // 2, slop_ns - slop_ns // 2)
+        self._windows = [
+            self._half if tolerance is None else _Window(*(min(tolerance, reach) for reach in self._half))
+            for tolerance in tolerances_ns or (None,) * len(required)
+        ]
         self._least_steps = [max(1, period) for period in min_periods_ns or (1,) * len(required)]
         self._newest: dict[int, int] = {}
         self._is_any = not any(required)
@@ -80,13 +104,14 @@ class OptionalInputs(OptionalStage):
 
     def chosen(self, seed: Seed) -> dict[int, int]:
         waiting, _ = seed
-        low, high = waiting.low, waiting.high
+        begin, close = self._shared(waiting)
         chosen = {}
         for index, queue in self._queues.items():
-            position = self._nearest(seed, queue.stamps, low, high)
+            position = self._nearest(seed, index, begin, close)
             if position is not None:
                 stamp = chosen[index] = queue.stamps[position]
-                low, high = min(low, stamp), max(high, stamp)
+                first, last = self._windows[index].around(stamp, stamp)
+                begin, close = max(begin, first), min(close, last)
         return chosen
 
     def complete(self, seed: Seed) -> list[Outcome]:
@@ -95,8 +120,8 @@ class OptionalInputs(OptionalStage):
         useless = waiting.high - self._slop
         if self._is_any:
             useless = waiting.low
-            lowest = min(chosen.values())
-            self._last = _Last(useless, lowest + self._slop, frozenset(chosen))
+            close = min(stamp + self._windows[index].after for index, stamp in chosen.items())
+            self._last = _Last(useless, close, frozenset(chosen))
         drops: list[Drop] = []
         for index, queue in self._queues.items():
             if index in chosen:
@@ -126,18 +151,27 @@ class OptionalInputs(OptionalStage):
             return False
         waiting, following = seed
         next_stamp = newest + self._least_steps[index]
-        stamps = self._queues[index].stamps
-        position = self._nearest(seed, stamps, waiting.low, waiting.high)
+        begin, close = self._shared(waiting)
+        position = self._nearest(seed, index, begin, close)
         if position is None:
-            return next_stamp > self._last_fitting(waiting, following, waiting.low)
-        mirrored = waiting.low + waiting.high - stamps[position]
+            return next_stamp > self._last_fitting(waiting, following, index, close)
+        mirrored = waiting.low + waiting.high - self._queues[index].stamps[position]
         return next_stamp >= mirrored
 
-    def _nearest(self, seed: Seed, stamps: list[int], low: int, high: int) -> int | None:
-        """Return the place of the stamp nearest to the set's middle within slop; of two equally near, the older."""
+    def _shared(self, waiting: Waiting) -> tuple[int, int]:
+        """Return the first and the last moment that what a set is made round shares."""
+        window = self._half if waiting.leader is None else self._windows[waiting.leader]
+        return window.around(waiting.low, waiting.high)
+
+    def _nearest(self, seed: Seed, index: int, begin: int, close: int) -> int | None:
+        """Return the place of an input's stamp nearest to the set's middle, of those whose window meets the set's.
+
+        Of two that are equally near, it is the older.
+        """
         waiting, following = seed
-        first = bisect_left(stamps, high - self._slop)
-        end = bisect_right(stamps, self._last_fitting(waiting, following, low))
+        stamps = self._queues[index].stamps
+        first = bisect_left(stamps, begin - self._windows[index].after)
+        end = bisect_right(stamps, self._last_fitting(waiting, following, index, close))
         if first >= end:
             return None
         after = min(max(bisect_left(stamps, -(-(waiting.low + waiting.high) // 2)), first), end - 1)
@@ -146,9 +180,9 @@ class OptionalInputs(OptionalStage):
         is_before = waiting.low + waiting.high - 2 * stamps[before]
         return after if abs(is_after) < abs(is_before) else before
 
-    def _last_fitting(self, waiting: Waiting, following: Waiting | None, low: int) -> int:
-        """Return the last stamp within slop of `low` that is not nearer to the next set."""
-        last = low + self._slop
+    def _last_fitting(self, waiting: Waiting, following: Waiting | None, index: int, close: int) -> int:
+        """Return the last stamp of an input whose window begins by `close` and which is not nearer to the next set."""
+        last = close + self._windows[index].before
         if following is not None:
             last = min(last, (waiting.low + waiting.high + following.low + following.high) // 4)
         return last
@@ -161,44 +195,44 @@ class OptionalInputs(OptionalStage):
             heads = {index: stamps[index][place] for index, place in places.items() if place < len(stamps[index])}
             if len(heads) < self.lacking:
                 return
-            oldest, begin = min(heads.values()), sorted(heads.values())[self.lacking - 1] - self._slop
-            if oldest < begin:
-                # No set of enough inputs holds what is before.
-                places = {index: bisect_left(stamps[index], begin, places[index]) for index in heads}
+            windows = {index: self._windows[index].around(head, head) for index, head in heads.items()}
+            begin = sorted(first for first, _ in windows.values())[self.lacking - 1]
+            close = min(last for _, last in windows.values())
+            if close < begin:
+                # No set of enough inputs holds what ends before.
+                places = {
+                    index: bisect_left(stamps[index], begin - self._windows[index].after, places[index])
+                    for index in heads
+                }
                 continue
-            leader = self._leader(heads, oldest)
+            leader = _leader(windows, close)
             place = places[leader]
-            here, *following = [self._around(stamp) for stamp in stamps[leader][place : place + 2]]
+            here, *following = [self._around(stamp, leader) for stamp in stamps[leader][place : place + 2]]
             seed = here, following[0] if following else None
             if self._since(seed) is not None and self._is_new(seed):
                 yield seed
             places[leader] = place + 1
 
-    def _around(self, stamp: int) -> Waiting:
-        return Waiting(self._nothing, stamp, stamp, _EARLIEST)
+    def _around(self, stamp: int, leader: int) -> Waiting:
+        return Waiting(self._nothing, stamp, stamp, _EARLIEST, leader)
 
     def _is_new(self, seed: Seed) -> bool:
         """Whether a set is of another moment than the last, and not of those that were missing there."""
         last = self._last
         return last is None or any(
-            index in last.inputs or stamp > last.reach for index, stamp in self.chosen(seed).items()
+            index in last.inputs or stamp - self._windows[index].before > last.close
+            for index, stamp in self.chosen(seed).items()
         )
-
-    def _leader(self, heads: Mapping[int, int], oldest: int) -> int:
-        """Return the first input with a message within slop of the oldest one, or of one that is near that."""
-        leader, near = max(heads), oldest
-        for index, head in reversed(list(heads.items())):
-            if head <= near + self._slop:
-                leader, near = index, head
-        return leader
 
     def _drop_alone(self) -> list[Drop]:
         """Drop the oldest messages that can be in no set of enough inputs any more."""
         drops: list[Drop] = []
-        while firsts := {index: queue.stamps[0] for index, queue in self._queues.items() if queue.stamps}:
-            index = min(firsts, key=firsts.__getitem__)
-            last = firsts[index] + self._slop
-            if sum(self._may_have(other, last) for other in self.inputs) >= self.lacking:
+        while closes := {
+            index: queue.stamps[0] + self._windows[index].after for index, queue in self._queues.items() if queue.stamps
+        }:
+            index = min(closes, key=closes.__getitem__)
+            lasts = {other: closes[index] + self._windows[other].before for other in self.inputs}
+            if sum(self._may_have(other, last) for other, last in lasts.items()) >= self.lacking:
                 break
             drops += self._drop(index, 1, DropReason.TOO_FAR)
         return drops
@@ -215,6 +249,15 @@ class OptionalInputs(OptionalStage):
         for stamp in queue.stamps[:count]:
             del self.came[index][stamp]
         return queue.drop(count, reason)
+
+
+def _leader(windows: Mapping[int, tuple[int, int]], close: int) -> int:
+    """Return the first input whose window meets the one that ends first, at `close`, or one that meets that."""
+    leader = max(windows)
+    for index, (first, last) in reversed(list(windows.items())):
+        if first <= close:
+            leader, close = index, last
+    return leader
 
 
 class OptionalKeys(OptionalStage):

@@ -12,13 +12,14 @@ class Waiting(NamedTuple):
     """What a set is made round: its messages, their least and greatest stamp, when its wait began.
 
     The messages are those of the required inputs, None for the others. Where no input is required there are none yet,
-    and both stamps are that of the message which the set is made round.
+    and both stamps are that of the message which the set is made round, of the input `leader`.
     """
 
     messages: tuple[Message | None, ...]
     low: int
     high: int
     since: int
+    leader: int | None = None
 
 
 Seed: TypeAlias = tuple[Waiting, Waiting | None]

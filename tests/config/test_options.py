@@ -189,6 +189,11 @@ OPTIONS: dict[str, Row] = {
     "key: own": of_topic(of_first_topic("key"), KEYED, key="header.stamp.sec"),
     "offset": of_topic(sets_of((0, 150), (1, 100)), EXACT, offset="-50ms"),
     "min_period": of_topic(sets_of((0, 14), (1, 15)), min_period="90ms"),
+    "tolerance": of_topic(
+        sets_after(50, (0, 100), (1, 113)),
+        {**APPROXIMATE, "quorum": 1, "max_wait": "10ms"},
+        tolerance="2ms",
+    ),
     "topic": of_topic(of_first_topic("topic"), topic="/z"),
     "type": of_topic(of_first_topic("type"), type="sensor_msgs/msg/Imu"),
     "output": of_topic(outputs, output="/z"),

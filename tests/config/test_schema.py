@@ -88,7 +88,7 @@ def test_every_optional_key_says_its_default():
 
 
 def test_the_default_that_is_said_is_the_default():
-    for name in ("NodeConfig", "ApproximateTimeGroup", "PacedTopic"):
+    for name in ("NodeConfig", "ApproximateTimeGroup", "NearTopic"):
         for key, schema in SCHEMA["definitions"][name]["properties"].items():
             if schema.get("default"):
                 assert f"Default: {str(schema['default']).lower()}" in schema["description"], (name, key)

@@ -1,5 +1,6 @@
 """Groups with a quorum: what is said while somebody is missing, and how the group stands."""
 
+import re
 from functools import partial
 
 import pytest
@@ -93,3 +94,37 @@ def test_where_none_are_near_enough_it_is_the_slop():
     told = run(*lidars({}, **apart), seconds=40, options=OPTIONS)
     assert told.codes == {"over_slop"}
     assert told.facts.standing is Standing.NONE
+
+
+def lidars_of(stamped_off_ms, tolerances):
+    """Three lidars, each stamped so far off their common moment, of which some have a tolerance."""
+    for name, off, tolerance in zip(NAMES, stamped_off_ms, tolerances, strict=True):
+        keys = {"min_period": "70ms"} | ({"tolerance": tolerance} if tolerance else {})
+        yield Source(name, 10, phase_ms=off, topic_options=keys, jitter_ms=0.2, delay_jitter_ms=1)
+
+
+def test_one_that_its_tolerance_keeps_out_is_told_so_and_no_slop_is_offered():
+    told = run(*lidars_of((0, 1, 16), (None, None, "2ms")), seconds=40, options=OPTIONS)
+    (finding,) = [each for each in told.found[-1][1] if each.severity is not Severity.OK]
+    assert (finding.code.value, finding.input) == ("waiting_for_optional", 2)
+    over = "stamps of /right and /top are usually 16 ms apart, over tolerance 2 ms of /right plus half of slop 20 ms"
+    assert over in finding.text
+    assert finding.suggestion == "check how these topics are stamped, or write a wider `tolerance`"
+
+
+def test_where_tolerances_let_no_set_leave_they_are_named_and_no_slop_is_offered():
+    told = run(*lidars_of((0, 8, 16), ("2ms", "3ms", "2ms")), seconds=40, options=OPTIONS)
+    assert told.codes == {"over_slop"}
+    finding = next(each for each in told.found[-1][1] if each.code.value == "over_slop")
+    assert re.fullmatch(
+        r"stamps of /top and /left are usually (7\.9\d*|8|8\.0\d*) ms apart, over tolerance 2 ms of /top plus"
+        " tolerance 3 ms of /left",
+        finding.text,
+    )
+    assert finding.suggestion == "check how these topics are stamped, or write a wider `tolerance`"
+
+
+def test_tolerances_that_all_keep_are_no_news():
+    told = run(*lidars_of((0, 2, 8), ("2ms", "2ms", None)), seconds=40, options=OPTIONS)
+    assert told.codes == set()
+    assert told.facts.standing is Standing.ENOUGH

@@ -32,6 +32,7 @@ WRONG: dict[Any, list[dict[str, Any]]] = {
         {"slop_ns": -1},
         *({"age_penalty": age_penalty} for age_penalty in (-0.1, float("inf"), float("nan"))),
         *({"min_periods_ns": periods} for periods in ((0,), (0, -1))),
+        *({"tolerances_ns": tolerances} for tolerances in ((None,), (None, -1))),
     ],
     ApproximateTimeEager: [{"slop_ns": -1}],
     ApproximateEpsilonTime: [{"epsilon_ns": -1}],

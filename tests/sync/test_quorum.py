@@ -15,9 +15,13 @@ PERIOD, SLOP, MAX_WAIT, START = 100 * MS, 20 * MS, 60 * MS, 10**12
 WORLDS = chosen(short=60, long=1_000)
 
 
-def lidars(n_inputs=3, quorum=2, *, required=(), policy=None, **options):
+def lidars(n_inputs=3, quorum=2, *, required=(), policy=None, tolerances=None, **options):
     made = policy or ApproximateTime(
-        n_inputs=n_inputs, queue_size=10, slop_ns=SLOP, min_periods_ns=[PERIOD * 7 // 10] * n_inputs
+        n_inputs=n_inputs,
+        queue_size=10,
+        slop_ns=SLOP,
+        min_periods_ns=[PERIOD * 7 // 10] * n_inputs,
+        tolerances_ns=tolerances,
     )
     return SyncGroup(
         made,
@@ -137,9 +141,62 @@ def test_keys_need_a_required_input():
         lidars(policy=EqualKey(n_inputs=3, queue_size=10))
 
 
+def half_of_slop(tolerances):
+    """How far each input's stamps may be off."""
+    return [SLOP // 2 if each is None else each for each in tolerances]
+
+
+def test_two_are_in_a_set_where_they_are_no_farther_apart_than_both_may_be_off():
+    together = {True: 0, False: 0}
+    for seed in range(WORLDS):
+        rng = random.Random(seed)
+        tolerances = [rng.choice((None, 0, 2 * MS, 5 * MS, 9 * MS)) for _ in range(2)]
+        room = sum(half_of_slop(tolerances))
+        stamps = [
+            (START + turn * PERIOD, START + turn * PERIOD + rng.choice((room, room + 1, rng.randrange(SLOP))))
+            for turn in range(20)
+        ]
+        if rng.random() < 0.5:
+            stamps = [(other, one) for one, other in stamps]
+        sent = [
+            Scan(index, turn, both[index], both[index] + 5 * MS) for turn, both in enumerate(stamps) for index in (0, 1)
+        ]
+        are_near = [abs(one - other) <= room for one, other in stamps]
+        sets = turns_of(played(lidars(2, 1, tolerances=tolerances), sent))
+        whole = [turns for turns in sets if None not in turns]
+        assert whole == [(turn, turn) for turn, near in enumerate(are_near) if near], f"seed {seed}, {tolerances}"
+        for near in are_near:
+            together[near] += 1
+    assert min(together.values()) > WORLDS, together
+
+
+def test_one_joins_only_what_it_goes_with_all_of():
+    # The first may be 2 ms off, the others 10: each is near enough to the first, which the set is made round.
+    stamps = (0, -9 * MS, 10 * MS)
+    sent = [Scan(index, 0, START + stamp, START + 20 * MS + index) for index, stamp in enumerate(stamps)]
+    assert turns_of(played(lidars(tolerances=[2 * MS, None, None]), sent)) == [(0, 0, 0)]
+    assert turns_of(played(lidars(tolerances=[2 * MS, 8 * MS, None]), sent)) == [(0, 0, None)]
+
+
+def test_a_tolerance_of_half_of_slop_or_more_changes_nothing():
+    sent = [Scan(0, 0, START, START), Scan(1, 0, START + SLOP, START + SLOP), Scan(2, 0, START - 1, START + SLOP)]
+    for wide in (SLOP // 2, SLOP, PERIOD):
+        assert turns_of(played(lidars(tolerances=[wide] * 3), sent)) == turns_of(played(lidars(), sent))
+
+
+def test_required_inputs_are_not_matched_by_tolerances():
+    with pytest.raises(ValueError, match="must be None where an input is required"):
+        lidars(required=[0], tolerances=[None, MS, None])
+
+
 def drawn_world(rng):
-    """Lidars that turn alike: each stamp is within slop of all of its turn; delays, losses, deaths, late ones."""
+    """Lidars that turn alike: stamps are as far off their turn's moment as they may; delays, losses, deaths, late ones.
+
+    Some may be off by less than half of slop.
+    """
     n_inputs = rng.choice((2, 3, 3, 4, 5))
+    tolerances = rng.choice((None, [rng.choice((None, 0, 3 * MS, 7 * MS)) for _ in range(n_inputs)]))
+    offs = half_of_slop(tolerances or [None] * n_inputs)
     slowest = rng.choice((10, 40, 150)) * MS
     loss = rng.choice((0, 0.05, 0.3))
     sent: list[Scan] = []
@@ -149,20 +206,20 @@ def drawn_world(rng):
         for turn in range(60):
             if any(begin <= turn < end for begin, end in away) or rng.random() < loss:
                 continue
-            stamp = START + turn * PERIOD + rng.randrange(SLOP + 1)
+            stamp = START + turn * PERIOD + rng.randint(-offs[index], offs[index])
             # Of one lidar, messages come in order.
             last[index] = max(last.get(index, 0) + 1, stamp + rng.randrange(slowest))
             sent.append(Scan(index, turn, stamp, last[index]))
-    return n_inputs, sent
+    return n_inputs, tolerances, sent
 
 
 def test_in_any_world_each_turn_with_enough_lidars_in_time_is_one_whole_set():
     seen = {"sets": 0, "partial": 0, "late": 0}
     for seed in range(WORLDS):
         rng = random.Random(seed)
-        n_inputs, sent = drawn_world(rng)
+        n_inputs, tolerances, sent = drawn_world(rng)
         quorum = rng.randint(1, n_inputs)
-        group, tally = lidars(n_inputs, quorum), Tally(n_inputs)
+        group, tally = lidars(n_inputs, quorum, tolerances=tolerances), Tally(n_inputs)
         left = played(group, sent)
         for scan in sent:
             tally.fed[scan.input] += 1

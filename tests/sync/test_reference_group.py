@@ -23,6 +23,7 @@ def drawn(rng, policy):
         required[rng.randrange(n_inputs)] = True
     quorum = rng.randint(max(1, sum(required)), n_inputs)
     quorum = rng.choice((quorum, sum(required) or quorum))
+    has_tolerances = not any(required) and policy == "approximate_time" and rng.random() < 0.8
     may_wait_forever = all(required) or policy in ("latest_time", *BY_CLOCK)
     return Options(
         required=tuple(required),
@@ -32,6 +33,7 @@ def drawn(rng, policy):
         age_penalty=rng.choice((0.0, 0.1, 2.0)),
         min_periods=rng.choice(((), tuple(rng.randrange(4) for _ in required))),
         max_ages=rng.choice(((), tuple(rng.choice((None, 0, 2, 5)) for _ in required))),
+        tolerances=tuple(rng.choice((None, 0, 1, 1.5, 2)) for _ in required) if has_tolerances else (),
         max_wait=rng.choice((*[None] * may_wait_forever, 0, 3, 8)),
         offsets=rng.choice(((), tuple(rng.randrange(-5, 6) for _ in required))),
         restamp=rng.choice((None, Restamp.EARLIEST, Restamp.LATEST, rng.randrange(n_inputs))),
@@ -50,7 +52,10 @@ def reference(policy, options):
             options.n_inputs,
             options.queue_size,
             0 if policy == "exact_time" else options.slop * TICK,
-            [step * TICK for step in steps or (0,) * options.n_inputs],
+            steps=[step * TICK for step in steps or (0,) * options.n_inputs],
+            tolerances=[
+                each if each is None else int(each * TICK) for each in options.tolerances or (None,) * options.n_inputs
+            ],
         )
 
     made = make_policy(policy, options)

@@ -28,7 +28,7 @@ class Drawn:
         self.delays: Counter[str] = Counter()
         self.expected: str | None = None
         # In turn, so that each is there.
-        self.kind = ("own", "common", "clock", "slop", "queue")[seed % 5]
+        self.kind = ("own", "common", "clock", "slop", "queue", "tolerance")[seed % 6]
         getattr(self, f"_{self.kind}")()
 
     @property
@@ -94,6 +94,18 @@ class Drawn:
         self._every("/b", 100, first=apart)
         if slop < apart:
             self.expected = f"only 0 of {sets} possible sets are complete, because of slop {_said(slop)}: without it,"
+
+    def _tolerance(self) -> None:
+        """Two inputs that a tolerance of one keeps apart, or does not, and one that is far from both."""
+        self.keys = ["policy: approximate_time", "slop: 40ms", "quorum: 2", "max_wait: 50ms"]
+        apart, tolerance = self.random.randrange(10, 40), self.random.randrange(20)
+        sets = len(self._every("/a", 200, own=f", tolerance: {tolerance}ms"))
+        self._every("/b", 200, first=apart)
+        self._every("/c", 200, first=120)
+        if tolerance + 20 < apart:
+            self.expected = (
+                f"only 0 of {sets} possible sets are complete, because of tolerance {_said(tolerance)} for /a"
+            )
 
     def _queue(self) -> None:
         queue = self.random.choice((1, 3, 20))

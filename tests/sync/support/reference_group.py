@@ -246,7 +246,10 @@ class Stage:
         messages = [None] * self.n_inputs
         for message in members:
             messages[message.input] = message
-        self.waiting.append({"messages": messages, "stamps": stamps, "since": since, "key": members[0].key})
+        there = list(zip(stamps, [message.input for message in members], strict=True))
+        self.waiting.append(
+            {"messages": messages, "stamps": stamps, "there": there, "since": since, "key": members[0].key}
+        )
         left = self.leave_decided()
         return left + self.leave() if len(self.waiting) > self.queue_size else left
 
@@ -260,12 +263,12 @@ class Stage:
 
     def taken(self, seed):
         """The messages that a set takes of the optional inputs."""
-        stamps, taken = list(seed["stamps"]), {}
+        there, taken = list(seed["there"]), {}
         for index in self.optional:
-            best = self.best(index, seed, stamps)
+            best = self.best(index, seed, there)
             if best is not None:
                 taken[index] = best
-                stamps.append(best[0])
+                there.append((best[0], index))
         return taken
 
     def since(self, seed):
@@ -319,11 +322,19 @@ class Stage:
 
 
 class ByStamp(Stage):
-    """Each set takes the message nearest to its middle within slop, unless it is nearer to the next set."""
+    """Each set takes the message nearest to its middle that is near all others, unless it is nearer to the next set.
 
-    def __init__(self, optional, n_inputs, queue_size, slop, steps):
+    Near are two that are no farther apart than both may be off: half of slop, or less where the tolerance is less.
+    """
+
+    def __init__(self, optional, n_inputs, queue_size, slop, *, steps, tolerances):
         super().__init__(optional, n_inputs, queue_size)
         self.slop, self.steps = slop, steps
+        self.twice_off = [slop if each is None else min(2 * each, slop) for each in tolerances]
+
+    def room(self, one, other):
+        """How much later the first of two could be and still be near the other, in half nanoseconds."""
+        return self.twice_off[one[1]] + self.twice_off[other[1]] - 2 * (one[0] - other[0])
 
     def is_same(self, one, other):
         return one[0] == other[0]
@@ -338,22 +349,32 @@ class ByStamp(Stage):
         """Wherever messages of enough inputs are near the oldest of them: round the first input's that is near."""
         rest, seeds = self.in_order(self.queued), []
         while rest:
-            oldest = rest[0][0]
-            near = {message.input for stamp, message in rest if stamp <= oldest + self.slop}
+            seed = self.soonest_over(rest)
+            near = {each[1].input for each in rest if self.is_in_time(each, seed)}
             if len(near) < self.quorum:
-                del rest[0]
+                rest.remove(seed)
                 continue
             first = [next((each for each in rest if each[1].input == index), None) for index in self.optional]
-            seed = rest[0]
             for each in reversed(first[: seed[1].input]):
-                if each is not None and each[0] <= seed[0] + self.slop:
+                if each is not None and self.is_in_time(each, seed):
                     seed = each
             rest.remove(seed)
             following = [stamp for stamp, message in rest if message.input == seed[1].input]
-            around = {"messages": [None] * self.n_inputs, "stamps": [seed[0]], "since": -START_OF_TIME}
+            there = [(seed[0], seed[1].input)]
+            around = {
+                "messages": [None] * self.n_inputs, "stamps": [seed[0]], "there": there, "since": -START_OF_TIME
+            }  # fmt: skip
             made = {**around, "next": {"stamps": following[:1]} if following else None}
             seeds += [made] if self.since(made) is not None and not self.was_left_out(made) else []
         return seeds
+
+    def soonest_over(self, queued):
+        """The message to which the fewest later ones can be near."""
+        return min(self.in_order(queued), key=lambda each: 2 * each[0] + self.twice_off[each[1].input])
+
+    def is_in_time(self, each, other):
+        """Whether a message is near another, or before it."""
+        return self.room((each[0], each[1].input), (other[0], other[1].input)) >= 0
 
     def was_left_out(self, made):
         """Whether it is made only of what the last set would have taken, had it come in time."""
@@ -361,21 +382,20 @@ class ByStamp(Stage):
             return False
         _, members = self.last
         return all(
-            index not in members and stamp - min(members.values()) <= self.slop
+            index not in members and all(self.room((stamp, index), (was, other)) >= 0 for other, was in members.items())
             for index, (stamp, _) in self.taken(made).items()
         )
 
     def drop_alone(self):
         left: list[Outcome] = []
         while self.is_any and self.queued:
-            oldest = self.in_order(self.queued)[0]
-            last = oldest[0] + self.slop
+            oldest = self.soonest_over(self.queued)
             may_be_near = [
                 index
                 for index in self.optional
                 if index not in self.shown
-                or self.shown[index] + max(1, self.steps[index]) <= last
-                or any(stamp <= last for stamp, _ in self.of(index))
+                or self.room((self.shown[index] + max(1, self.steps[index]), index), (oldest[0], oldest[1].input)) >= 0
+                or any(self.is_in_time(each, oldest) for each in self.of(index))
             ]
             if len(may_be_near) >= self.quorum:
                 break
@@ -386,13 +406,14 @@ class ByStamp(Stage):
         """Twice the middle."""
         return min(seed["stamps"]) + max(seed["stamps"])
 
-    def fits(self, stamp, seed, stamps):
-        near = max([*stamps, stamp]) - min([*stamps, stamp]) <= self.slop
+    def fits(self, one, seed, there):
+        stamp, _ = one
+        near = all(self.room(one, other) >= 0 and self.room(other, one) >= 0 for other in there)
         following = seed["next"]
         return near and (following is None or 2 * stamp - self.middle(seed) <= self.middle(following) - 2 * stamp)
 
-    def best(self, index, seed, stamps):
-        fitting = [each for each in self.of(index) if self.fits(each[0], seed, stamps)]
+    def best(self, index, seed, there):
+        fitting = [each for each in self.of(index) if self.fits((each[0], index), seed, there)]
         return min(fitting, key=lambda each: (abs(2 * each[0] - self.middle(seed)), each[0]), default=None)
 
     def useless(self, index, seed, best):
@@ -404,11 +425,12 @@ class ByStamp(Stage):
         if index not in self.shown:
             return False
         soonest = self.shown[index] + max(1, self.steps[index])
-        stamps, middle = seed["stamps"], self.middle(seed)
-        best = self.best(index, seed, stamps)
+        there, middle = seed["there"], self.middle(seed)
+        best = self.best(index, seed, there)
         if best is not None:
             return abs(2 * soonest - middle) >= abs(2 * best[0] - middle) and 2 * soonest >= middle
-        return soonest > max(stamps) - self.slop and not self.fits(soonest, seed, stamps)
+        one = (soonest, index)
+        return all(self.room(other, one) > 0 for other in there) and not self.fits(one, seed, there)
 
 
 class ByKey(Stage):

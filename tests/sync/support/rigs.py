@@ -32,6 +32,7 @@ class Options:
     age_penalty: float = 0.1
     min_periods: tuple = ()
     max_ages: tuple = ()
+    tolerances: tuple = ()
     max_wait: int | None = None
     offsets: tuple = ()
     restamp: object = None
@@ -94,7 +95,11 @@ def _needed(key, model, options):
 
 
 def _topics(model, options):
-    of_topics = {"min_period": [each * TICK for each in options.min_periods], "max_age": options.max_ages_ns}
+    of_topics = {
+        "min_period": [each * TICK for each in options.min_periods],
+        "max_age": options.max_ages_ns,
+        "tolerance": [each if each is None else int(each * TICK) for each in options.tolerances],
+    }
     known = topic_model(model).model_fields
     for index in range(options.n_inputs):
         values = {key: each[index] for key, each in of_topics.items() if key in known and each}

@@ -1,0 +1,60 @@
+"""How far apart the stamps of two inputs usually are: which input is off, and which tolerances are too narrow."""
+
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from syncrelay.explain import words
+from syncrelay.explain.facts import GroupFacts, InputFacts
+from syncrelay.explain.nearest import quantile, shifted, signed_distances
+
+# Of fewer messages nothing is usual.
+_FEWEST: Final = 3
+
+
+def odd_one(facts: GroupFacts) -> int | None:
+    """Return the input whose stamps lie off those of all others, which lie near each other; None if there is none."""
+    tolerance, required = facts.tolerance, [index for index, each in enumerate(facts.inputs) if each.required]
+    if tolerance is None or len(required) < 3:  # noqa: PLR2004  of two, either may be
+        return None
+    far = []
+    for one, other in combinations(required, 2):
+        apart = _usually_apart(facts.inputs[one], facts.inputs[other])
+        if apart is None:
+            return None
+        if apart > tolerance.ns:
+            far.append({one, other})
+    odd = set.intersection(*far) if len(far) > 1 else set()
+    return odd.pop() if len(odd) == 1 and len(far) == len(required) - 1 else None
+
+
+def over_tolerances(facts: GroupFacts, index: int | None = None) -> str | None:
+    """Say which two inputs, of `index` and one that is required, slop allows and a tolerance of one of them does not.
+
+    Without `index`, both are required. None if there are no such two.
+    """
+    required = [each for each in facts.inputs if each.required]
+    pairs = combinations(required, 2) if index is None else ((facts.inputs[index], each) for each in required)
+    for pair in pairs:
+        if facts.tolerance is None or all(each.narrowed is None for each in pair):
+            continue
+        slop, apart = facts.tolerance.ns, _usually_apart(*pair)
+        room = sum(slop // 2 if each.narrowed is None else min(each.narrowed.ns, slop // 2) for each in pair)
+        if apart is not None and room < apart <= slop:
+            halves = (
+                f"half of {facts.tolerance.key} {words.duration(slop)}"
+                if each.narrowed is None
+                else f"{each.narrowed.key} {words.duration(each.narrowed.ns)} of {each.name}"
+                for each in pair
+            )
+            names = " and ".join(each.name for each in pair)
+            return f"stamps of {names} are usually {words.duration(apart)} apart, over {' plus '.join(halves)}"
+    return None
+
+
+def _usually_apart(*two: InputFacts) -> int | None:
+    """Return how far apart the stamps of two inputs usually are, in nanoseconds; None if too few have come to tell."""
+    stamps = (np.sort(shifted(np.array(each.figures.stamps, dtype=np.int64), each.offset)) for each in two)
+    distances = signed_distances(*sorted(stamps, key=len))
+    return None if len(distances) < _FEWEST else abs(quantile(distances, 0.5))
