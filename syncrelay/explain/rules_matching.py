@@ -76,19 +76,10 @@ def over_slop(facts: GroupFacts) -> Found:
     if facts.has_stopped and (narrow := over_tolerances(facts)) is not None:
         yield Fault(narrow, _CHECK_TOLERANCES, Severity.ERROR if facts.is_silent else Severity.WARN)
         return
-    over = nearest.share_over(tolerance.ns)
-    if not facts.has_stopped:
-        if is_near_again(facts):
-            return
-        # What was so a while ago, as while an input was away, is no more.
-        lately = facts.figures.nearest_lately or nearest
-        over = min(over, lately.share_over(tolerance.ns))
-    came_at_once = any(each.required and each.figures.bursts for each in facts.inputs)
-    if facts.has_stopped and over > 1 - _MISSED:
+    if facts.has_stopped and nearest.share_over(tolerance.ns) > 1 - _MISSED:
         severity = Severity.ERROR if facts.is_silent else Severity.WARN
         text = _too_wide(facts, tolerance, nearest)
-    # What was held up may only seem far apart, and a wider slop would pair what came together.
-    elif not facts.has_stopped and over > (_MOST if came_at_once else _beyond_chance(_MISSED, len(nearest))):
+    elif not facts.has_stopped and _is_often_over(facts, tolerance, nearest):
         text, severity = _often_too_wide(facts, tolerance, nearest), Severity.WARN
     else:
         return
@@ -104,6 +95,18 @@ def over_slop(facts: GroupFacts) -> Found:
     if odd is not None:
         text += f"; it is {facts.inputs[odd].name} that is off, the others are near each other"
     yield Fault(text, _advice(facts, found) or check, severity)
+
+
+def _is_often_over(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> bool:
+    """Whether so many of the nearest messages are farther apart than the tolerance that it is no chance."""
+    if is_near_again(facts):
+        return False
+    # What was so a while ago, as while an input was away, is no more.
+    lately = facts.figures.nearest_lately or nearest
+    over = min(nearest.share_over(tolerance.ns), lately.share_over(tolerance.ns))
+    came_at_once = any(each.required and each.figures.bursts for each in facts.inputs)
+    # What was held up may only seem far apart, and a wider slop would pair what came together.
+    return over > (_MOST if came_at_once else _beyond_chance(_MISSED, len(nearest)))
 
 
 def _beyond_chance(share: float, count: int) -> float:
