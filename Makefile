@@ -8,6 +8,9 @@ CONSTRAINTS ?= -c .ci/constraints.txt
 BIN := $(VENV)/bin
 # A change of these takes a new installation: the compiled path is built by it.
 BUILT_OF := pyproject.toml .ci/constraints.txt setup.py syncrelay/ros/compiled/path.pyx docker/build_messages.py
+# What the wheels of ROS lack of what the tests need.
+BUILD_TF2_MSGS = $(BIN)/python docker/build_messages.py docker/messages/tf2_msgs >/dev/null \
+	|| echo "tf2_msgs could not be built (it takes g++): tests with transforms are skipped" >&2
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Where an image sets it, each process that the tests start would compile all modules of this tree again: 0.06 to 0.2 s.
 unexport PYTHONDONTWRITEBYTECODE
@@ -133,13 +136,13 @@ $(VENV)/demo: $(BIN)/python $(BUILT_OF)
 
 $(VENV)/test: $(BIN)/python $(BUILT_OF)
 	$(BIN)/python -m pip install -q $(CONSTRAINTS) -e '.[$(ROS),test]' ros-$(ROS:ros=jazzy)-test-msgs
-	$(BIN)/python docker/build_messages.py docker/messages/tf2_msgs >/dev/null \
-		|| echo "tf2_msgs could not be built (it takes g++): tests of transforms over DDS are skipped" >&2
+	$(BUILD_TF2_MSGS)
 	touch $@
 
 # All that CI runs in one venv: installed at once, and not three times over.
 $(VENV)/ci: $(BIN)/python $(BUILT_OF)
 	$(BIN)/python -m pip install -q $(CONSTRAINTS) -e '.[$(ROS),test,lint,docs]' ros-$(ROS:ros=jazzy)-test-msgs
+	$(BUILD_TF2_MSGS)
 	touch $(VENV)/test $(VENV)/lint $(VENV)/docs $@
 
 $(VENV)/fleet: $(VENV)/test

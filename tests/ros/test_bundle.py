@@ -10,6 +10,7 @@ from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.frames import Frame
 from tests.ros.made_messages import MadeMessages, made
 from tests.ros.manifests import MANIFEST_TYPE, Told, read
+from tests.ros.processes import wait_until
 from tests.ros.relaying import play_until_out
 from tests.ros.stage import Collector, Stage, both_backends
 from tests.ros.status import ANY_PORT, groups_of, wait_for_finding
@@ -153,6 +154,10 @@ def test_a_common_stamp_is_in_the_members_too_and_outputs_are_left_as_they_were(
         )
 
 
+def _publishers(collector):
+    return collector.endpoints("/front/set", kind="publisher")
+
+
 def test_a_reload_leaves_the_bundles_publisher_as_it_is_and_a_lazy_group_wakes_for_it(
     sourced: Stage, pair: MadeMessages
 ):
@@ -164,7 +169,9 @@ def test_a_reload_leaves_the_bundles_publisher_as_it_is_and_a_lazy_group_wakes_f
     collector = sourced.collector({"/front/set": _PAIR})
     numbers = iter(range(0, 300, 3))
     play_until_out(player, collector, (_frames(number) for number in numbers), ["/front/set"])
-    (before,) = collector.endpoints("/front/set", kind="publisher")
+    # A node's name may come later than its publishers.
+    wait_until(lambda: [each["node"] for each in _publishers(collector)] == ["/syncrelay"], "the bundle's publisher")
+    before = _publishers(collector)
     lazy["front"]["slop"] = "19ms"
     (sourced.folder / "config-0.yaml").write_text(config(lazy, metrics=ANY_PORT))
     assert sourced.caller().call("reload") == (True, "reloaded: 0 groups unchanged; rebuilt front")
@@ -174,7 +181,7 @@ def test_a_reload_leaves_the_bundles_publisher_as_it_is_and_a_lazy_group_wakes_f
         _require_whole(pair, payload) for payload in collector.wait_for("/front/set", count + 30)[count : count + 30]
     ]
     assert played == list(range(first, first + 30))
-    assert collector.endpoints("/front/set", kind="publisher") == [before]
+    assert _publishers(collector) == before
     group = groups_of(relay)["front"]
     assert [each["output"] for each in group["inputs"]] == ["/front/set", "/front/set"]
     assert [[one["node"] for one in each["subscribers"]] for each in group["inputs"]] == [["/collector"]] * 2

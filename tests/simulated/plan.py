@@ -2,10 +2,14 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
 from random import Random
 from typing import Any, Final, NamedTuple
 
 from tests.simulated.scheduler import MS
+
+# The relay imports the type of /tf, which the wheels lack and a C++ compiler has to make.
+_CAN_TRANSFORM: Final = find_spec("tf2_msgs") is not None
 
 # A rig has found itself by then, and what is said of it is to be true.
 SETTLED_S: Final = 25.0
@@ -177,7 +181,7 @@ def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
     groups = tuple(_group(chance, f"g{n}", sensors, exact=exact, hz=hz) for n in range(chance.choice([1, 1, 2, 3])))
     # By chance of its own: worlds without transforms are those that they were.
     by_key = any("key" in group.options for group in groups)
-    transforms = not by_key and Random(f"transforms {seed}").random() < 0.25
+    transforms = _CAN_TRANSFORM and not by_key and Random(f"transforms {seed}").random() < 0.25
     if transforms:
         groups = tuple(replace(each, options={**each.options, "transforms": TRANSFORMS}) for each in groups)
     # By chances of their own: worlds without such a group stay as they were.
