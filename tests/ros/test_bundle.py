@@ -1,6 +1,7 @@
 """Sets as one message each, over DDS, of a type that is only known from a package that was built here."""
 
 import re
+from itertools import count
 from typing import Any
 
 import pytest
@@ -79,7 +80,7 @@ def _frames(number: int) -> list[Frame]:
 
 def _connected(stage: Stage, collector: Collector, *topics: str) -> tuple[Any, int]:
     """The player, and the number of the next set to play, once a set has come out."""
-    player, numbers = stage.player(_TOPICS), iter(range(0, 300, 3))
+    player, numbers = stage.player(_TOPICS), count(0, 3)
     play_until_out(player, collector, (_frames(number) for number in numbers), topics)
     return player, next(numbers)
 
@@ -140,7 +141,7 @@ def test_a_common_stamp_is_in_the_members_too_and_outputs_are_left_as_they_were(
     before = [collector.count(topic) for topic in topics]
     player.play([frame for number in range(first, first + 31) for frame in _frames(number)], speed=1e9)
     bundles, lefts = (
-        collector.wait_for(topic, count + 30)[count : count + 30] for topic, count in zip(topics, before, strict=True)
+        collector.wait_for(topic, had + 30)[had : had + 30] for topic, had in zip(topics, before, strict=True)
     )
     for number, bundle, left in zip(range(first, first + 30), bundles, lefts, strict=True):
         latest = max(stamp_of(frame.payload) for frame in _frames(number))
@@ -167,7 +168,7 @@ def test_a_reload_leaves_the_bundles_publisher_as_it_is_and_a_lazy_group_wakes_f
     player.is_up()
     wait_for_finding(relay, "nobody_listens", naming=["/front/set"])
     collector = sourced.collector({"/front/set": _PAIR})
-    numbers = iter(range(0, 300, 3))
+    numbers = count(0, 3)
     play_until_out(player, collector, (_frames(number) for number in numbers), ["/front/set"])
     # A node's name may come later than its publishers.
     wait_until(lambda: [each["node"] for each in _publishers(collector)] == ["/syncrelay"], "the bundle's publisher")
@@ -175,11 +176,9 @@ def test_a_reload_leaves_the_bundles_publisher_as_it_is_and_a_lazy_group_wakes_f
     lazy["front"]["slop"] = "19ms"
     (sourced.folder / "config-0.yaml").write_text(config(lazy, metrics=ANY_PORT))
     assert sourced.caller().call("reload") == (True, "reloaded: 0 groups unchanged; rebuilt front")
-    count, first = collector.count("/front/set"), next(numbers)
+    had, first = collector.count("/front/set"), next(numbers)
     player.play([frame for number in range(first, first + 31) for frame in _frames(number)], speed=1e9)
-    played = [
-        _require_whole(pair, payload) for payload in collector.wait_for("/front/set", count + 30)[count : count + 30]
-    ]
+    played = [_require_whole(pair, payload) for payload in collector.wait_for("/front/set", had + 30)[had : had + 30]]
     assert played == list(range(first, first + 30))
     assert _publishers(collector) == before
     group = groups_of(relay)["front"]
