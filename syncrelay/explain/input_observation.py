@@ -146,10 +146,16 @@ class InputObservation:
 
         Return the first of the new messages that are of the clock of now.
         """
-        by = _steps([*self._delays[-1:], *delays])
+        if not delays:
+            return 0
+        before = self._delays[-1] if self._delays else delays[0]
         # Stamps that do not run as time does may have come to do so.
         least = _JUMP_NS if has_fallen or self._is_misread else _FAR_NS
-        # As nearly always. Of two clocks in turn, each fall is followed by a rise: nothing begins anew.
+        if max(before, *delays) - min(before, *delays) <= least:
+            # As nearly always, and seen without looking at each.
+            return 0
+        by = _steps([*self._delays[-1:], *delays])
+        # Of two clocks in turn, each fall is followed by a rise: nothing begins anew.
         if max(map(abs, by), default=0) <= least or self._steps.swings(received[-1])[0]:
             return 0
         # Of seconds that are milliseconds, each is far from the one before it.

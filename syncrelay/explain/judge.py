@@ -145,6 +145,9 @@ class Judge:
         # What is the effect of another cause is over when its cause is.
         own = wide if wide is not None and self._root(wide, facts) is wide else None
         self._too_wide, before = own or (None if is_back else self._too_wide), self._too_wide
+        if before is None and self._too_wide is None:
+            # As nearly always: the newest need not be looked at.
+            return ()
         if rules_matching.is_near_again(facts):
             self._too_wide = None
             return ()

@@ -99,14 +99,13 @@ def over_slop(facts: GroupFacts) -> Found:
 
 def _is_often_over(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> bool:
     """Whether so many of the nearest messages are farther apart than the tolerance that it is no chance."""
-    if is_near_again(facts):
-        return False
     # What was so a while ago, as while an input was away, is no more.
     lately = facts.figures.nearest_lately or nearest
     over = min(nearest.share_over(tolerance.ns), lately.share_over(tolerance.ns))
     came_at_once = any(each.required and each.figures.bursts for each in facts.inputs)
     # What was held up may only seem far apart, and a wider slop would pair what came together.
-    return over > (_MOST if came_at_once else _beyond_chance(_MISSED, len(nearest)))
+    least = _MOST if came_at_once else _beyond_chance(_MISSED, len(nearest))
+    return over > least and not is_near_again(facts)
 
 
 def _beyond_chance(share: float, count: int) -> float:
