@@ -1,17 +1,21 @@
 """How fast a clock runs against the time of receipt, by the line under its delays."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import hypot
+from operator import itemgetter
 from statistics import median
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
 from syncrelay.clock.hull import Hull, Point
 
+_T = TypeVar("_T")
 _SECOND: Final = 1_000_000_000
 _FEWEST: Final = 5
 _PARTS: Final = 4
-# So many points tell as much as more, of which they are the least, and are not misled by noise to both sides.
+# So many points tell as much as more, of which they are the least, and are not misled by noise to both sides. Which
+# of so many lie on a line is seen before that.
 _JOINED: Final = 20
+_SHOWN: Final = 60
 # A point this many times as far above the line as the median point was held up on its way.
 _HELD_UP: Final = 6
 _LEAST_HELD_UP: Final = 0.001
@@ -50,6 +54,8 @@ def drift(points: Sequence[tuple[int, int]]) -> Drift | None:
     """
     if len(points) < _FEWEST or points[0][0] == points[-1][0]:
         return None
+    watched = points[-1][0] - points[0][0]
+    points = [min(part, key=itemgetter(1)) for part in _parts([*points], _SHOWN)]
     # As differences of integers, before floats could lose the nanoseconds of an epoch.
     first_time, first_delay = points[0]
     near = [((time - first_time) / _SECOND, (delay - first_delay) / _SECOND, 1) for time, delay in points]
@@ -66,16 +72,18 @@ def drift(points: Sequence[tuple[int, int]]) -> Drift | None:
     medians = [median([y - slope * x for x, y, _ in part]) for part in parts]
     bend = (max(medians) - min(medians)) / 2 * _SECOND
     error, doubt = (_half(hull.bounds(slope, evidence, _LEAST_JITTER)) for evidence in (_MAY_BE, _EVIDENT))
-    return Drift(slope, bend, points[-1][0] - first_time, error, doubt)
+    return Drift(slope, bend, watched, error, doubt)
 
 
 def _joined(points: Sequence[Point], slope: float) -> Sequence[Point]:
     """Return of each few points the one that is nearest to a line below."""
-    of = -(-len(points) // _JOINED)
-    if of == 1:
-        return points
-    parts = [points[first : first + of] for first in range(0, len(points), of)]
-    return [min(part, key=lambda point: point[1] - slope * point[0]) for part in parts]
+    return [min(part, key=lambda point: point[1] - slope * point[0]) for part in _parts(points, _JOINED)]
+
+
+def _parts(points: Sequence[_T], most: int) -> Iterable[Sequence[_T]]:
+    """Divide points into no more parts than so many, of as many each."""
+    of = -(-len(points) // most)
+    return (points[first : first + of] for first in range(0, len(points), of))
 
 
 def _line(points: Sequence[Point], rate: float) -> tuple[float, list[float]]:
