@@ -109,34 +109,23 @@ DurationOrNone = Annotated[
 ]
 """A duration of 0 or more, in nanoseconds; None for `none`."""
 
-_LONGEST_PAUSE_NS: Final = 100_000_000
+
+def _no_longer(most_s: float, why: str) -> tuple[BeforeValidator, WithJsonSchema]:
+    """Refuse longer durations, and say why."""
+
+    def check(value: object) -> int:
+        duration = not_negative(value)
+        if duration > most_s * 1_000_000_000:
+            raise ValueError(why)
+        return duration
+
+    return BeforeValidator(check), WithJsonSchema(duration_schema(sign=r"\+?", minimum=0, maximum=most_s))
 
 
-def _short(value: object) -> int:
-    pause = not_negative(value)
-    if pause > _LONGEST_PAUSE_NS:
-        raise ValueError("at most 100ms: all messages of the relay wait that long")
-    return pause
-
-
-ShortDuration = Annotated[
-    int, BeforeValidator(_short), WithJsonSchema(duration_schema(sign=r"\+?", minimum=0, maximum=0.1))
-]
+ShortDuration = Annotated[int, *_no_longer(0.1, "at most 100ms: all messages of the relay wait that long")]
 """A duration of 0 to 0.1 s, in nanoseconds."""
 
-_LONGEST_WAIT_NS: Final = 10_000_000_000
-
-
-def _kept_by_tf2(value: object) -> int:
-    wait = not_negative(value)
-    if wait > _LONGEST_WAIT_NS:
-        raise ValueError("at most 10s: tf2 keeps transforms no longer")
-    return wait
-
-
-TransformWait = Annotated[
-    int, BeforeValidator(_kept_by_tf2), WithJsonSchema(duration_schema(sign=r"\+?", minimum=0, maximum=10))
-]
+TransformWait = Annotated[int, *_no_longer(10, "at most 10s: tf2 keeps transforms no longer")]
 """A duration of 0 to 10 s, in nanoseconds."""
 
 SignedDuration = Annotated[int, BeforeValidator(parse_duration), WithJsonSchema(duration_schema(sign="[+-]?"))]

@@ -127,8 +127,9 @@ def _bad_value(error: ErrorDetails, path: Path, document: Document, form: Form) 
             return f"expected {_example(error['loc'], form)}, found {filled_in}"
         case "value_error":
             return str(context["error"])
-        case "greater_than_equal":
-            return f"expected {context['ge']:g} or more, found {describe(found)}"
+        case "greater_than_equal" | "greater_than":
+            least = f"{context['ge']:g} or more" if "ge" in context else f"more than {context['gt']:g}"
+            return f"expected {least}, found {describe(found)}"
         case "less_than_equal":
             return f"expected {context['le']} or less, found {describe(found)}"
         case "literal_error":

@@ -190,9 +190,14 @@ class Frames:
                 return None
         return failed or Missing(Lack.UNCONNECTED, target, source)
 
+    @property
+    def _deepest(self) -> int:
+        """How deep a frame can lie: what is deeper is in a loop, which so many steps show."""
+        return min(_DEEPEST, len(self._caches))
+
     def _up(self, frame: str, stamp: int) -> Iterator[tuple[str, str | Missing | None]]:
         """Yield a frame and its parent, then that one and its parent; last a root, or one whose edge is missing."""
-        for _ in range(_DEEPEST + 1):
+        for _ in range(self._deepest + 1):
             cache = self._caches.get(frame)
             if cache is None:
                 yield frame, None
@@ -223,7 +228,7 @@ class Frames:
         raise _NoChainError(Lack.UNCONNECTED, source)
 
     def _latest_up(self, frame: str, *, until: str) -> Iterator[tuple[int, str]]:
-        for _ in range(_DEEPEST + 1):
+        for _ in range(self._deepest + 1):
             cache = self._caches.get(frame)
             latest = cache.latest() if cache is not None else None
             if latest is None:
