@@ -7,7 +7,7 @@ from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.findings import Finding
-from syncrelay.explain.troubles import Cause, Found, named, sentence, topics_by_cause, worst_first
+from syncrelay.explain.troubles import Found, Origin, named, sentence, topics_by_cause, worst_first
 
 _SECOND: Final = 1_000_000_000
 # Lines wait until every group was judged, but no longer than this: a bug may have stopped a group.
@@ -65,10 +65,10 @@ class CauseLog:
         """Which node publishes a topic, or did when it was last seen."""
         self._waiting: list[tuple[str, Remark]] = []
         self._since = 0
-        self._said: dict[Cause, _Said] = {}
-        self._hit: dict[tuple[Cause, Code | None], set[str]] = {}
-        self._silenced_by: dict[str, Cause] = {}
-        self._ends: dict[tuple[Cause, Code | None], _End] = {}
+        self._said: dict[Origin, _Said] = {}
+        self._hit: dict[tuple[Origin, Code | None], set[str]] = {}
+        self._silenced_by: dict[str, Origin] = {}
+        self._ends: dict[tuple[Origin, Code | None], _End] = {}
 
     def watch(self, groups: Iterable[str]) -> None:
         """Forget all groups but these."""
@@ -108,7 +108,7 @@ class CauseLog:
                     yield _line(Severity.OK, end.remark.text, groups, end.remark.code)
 
     def _merged(self, waiting: Sequence[tuple[str, Remark]], now: int) -> Iterator[Line]:
-        warned: dict[Cause, list[tuple[str, Remark]]] = {}
+        warned: dict[Origin, list[tuple[str, Remark]]] = {}
         for group, remark in waiting:
             if remark.severity is Severity.OK:
                 self._end(group, remark, now)
@@ -118,7 +118,7 @@ class CauseLog:
         for cause, remarks in warned.items():
             yield from self._warn(cause, remarks, now)
 
-    def _causes_of(self, group: str, remark: Remark) -> Sequence[Cause]:
+    def _causes_of(self, group: str, remark: Remark) -> Sequence[Origin]:
         facts, _ = self._found[group]
         causes = dict.fromkeys(cause for each in remark.findings for cause in self._topics_by_cause(facts, each))
         is_silence = any(each.severity is Severity.ERROR for each in remark.findings)
@@ -128,7 +128,7 @@ class CauseLog:
             self._silenced_by.setdefault(group, next(iter(causes)))
         return [*causes]
 
-    def _warn(self, cause: Cause, remarks: Sequence[tuple[str, Remark]], now: int) -> Iterator[Line]:
+    def _warn(self, cause: Origin, remarks: Sequence[tuple[str, Remark]], now: int) -> Iterator[Line]:
         if cause.group:
             for group, remark in remarks:
                 found, hit = self._found_then(cause, [(group, remark)]), [self._found[group][0]]
@@ -153,7 +153,7 @@ class CauseLog:
         said.again, said.pause = now + said.pause, min(2 * said.pause, _LONGEST_PAUSE)
         yield _line(Severity.WARN, sentence(cause, found, hit), [each.name for each in hit], cause.code)
 
-    def _found_of(self, cause: Cause) -> list[Found]:
+    def _found_of(self, cause: Origin) -> list[Found]:
         """Return the findings of a cause in all groups, the most severe first."""
         now = (
             (facts, finding)
@@ -163,12 +163,12 @@ class CauseLog:
         )
         return worst_first(self._of_cause(cause, now))
 
-    def _found_then(self, cause: Cause, remarks: Sequence[tuple[str, Remark]]) -> list[Found]:
+    def _found_then(self, cause: Origin, remarks: Sequence[tuple[str, Remark]]) -> list[Found]:
         """Return the findings of the time of the remarks, which may be over by now."""
         then = ((self._found[group][0], finding) for group, remark in remarks for finding in remark.findings)
         return self._of_cause(cause, then)
 
-    def _of_cause(self, cause: Cause, found: Iterable[tuple[GroupFacts, Finding]]) -> list[Found]:
+    def _of_cause(self, cause: Origin, found: Iterable[tuple[GroupFacts, Finding]]) -> list[Found]:
         return [
             Found(facts, finding, topics)
             for facts, finding in found
@@ -176,10 +176,10 @@ class CauseLog:
             if each == cause
         ]
 
-    def _topics_by_cause(self, facts: GroupFacts, finding: Finding) -> Mapping[Cause, tuple[str, ...]]:
+    def _topics_by_cause(self, facts: GroupFacts, finding: Finding) -> Mapping[Origin, tuple[str, ...]]:
         return topics_by_cause(facts, finding, self.published_by, self._found.values())
 
-    def _groups_of(self, cause: Cause, found: Sequence[Found], topics: frozenset[str]) -> list[GroupFacts]:
+    def _groups_of(self, cause: Origin, found: Sequence[Found], topics: frozenset[str]) -> list[GroupFacts]:
         names = {each.facts.name for each in found}
         return [
             facts
@@ -194,8 +194,8 @@ class CauseLog:
         if remark.findings:
             causes = [cause for each in remark.findings for cause in self._topics_by_cause(facts, each)]
         else:
-            causes = [self._silenced_by.pop(group, Cause(None, group=group))]
-        key = next(((cause, remark.code) for cause in causes), (Cause(None, group=group), remark.code))
+            causes = [self._silenced_by.pop(group, Origin(None, group=group))]
+        key = next(((cause, remark.code) for cause in causes), (Origin(None, group=group), remark.code))
         for (cause, code), hit in self._hit.items():
             if code is remark.code and (code is None or cause in causes):
                 hit.discard(group)

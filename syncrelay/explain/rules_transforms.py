@@ -1,13 +1,14 @@
 """The finding about transforms: which edge is missing, by how much it lags, and with what wait sets would leave."""
 
 from collections.abc import Sequence
+from math import ceil
 from typing import Final
 
 from syncrelay.config.wording import counted
 from syncrelay.explain import words
 from syncrelay.explain.codes import Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
-from syncrelay.explain.findings import Fault, Found, nodes
+from syncrelay.explain.findings import SECOND, Fault, Found, nodes
 from syncrelay.sync import DropReason, Lack, Lapse, Missing
 
 # tf2 keeps transforms for 10 s: no `wait` may be longer.
@@ -86,6 +87,7 @@ def _late(missing: Missing, name: str, covered: Sequence[Lapse], facts: GroupFac
         return f"{edge} was up to {words.duration(needed)} behind {name}", _CHECK_BROADCASTER
     text = f"{edge} is {words.duration(needed)} behind {name}"
     if needed <= wait:
-        size = 2 * facts.queue_size
+        # As many wait at once as are matched in that time.
+        size = max(facts.queue_size, ceil(needed / SECOND * facts.possible_hz)) + 1
         return f"{text}, and no more than {counted(facts.queue_size, 'set')} can wait", f"write `queue_size: {size}`"
     return text, f"write `wait: {words.at_least(min(needed + needed // 10, _LONGEST_WAIT))}`"

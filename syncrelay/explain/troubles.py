@@ -14,7 +14,7 @@ from syncrelay.explain.judge import explanation
 _NAMED: Final = 3
 
 
-class Cause(NamedTuple):
+class Origin(NamedTuple):
     """A code and what it belongs to: a node, a group, topics that may be misspelled, or otherwise the relay."""
 
     code: Code | None
@@ -48,7 +48,7 @@ def troubles(
 
     `published_by` names the node of a topic, even one that has gone.
     """
-    by_cause: dict[Cause, list[Found]] = {}
+    by_cause: dict[Origin, list[Found]] = {}
     for facts, findings in found:
         first = explanation(tuple(findings)) if findings else None
         if first is None or first.severity is Severity.OK:
@@ -61,7 +61,7 @@ def troubles(
     )
 
 
-def _trouble(cause: Cause, found: Sequence[Found]) -> Trouble:
+def _trouble(cause: Origin, found: Sequence[Found]) -> Trouble:
     hit, first = [each.facts for each in found], found[0].finding
     text = _text(cause, found, hit)
     return Trouble(first.severity, first.code, text, first.suggestion or None, tuple(each.name for each in hit))
@@ -77,21 +77,21 @@ def topics_by_cause(
     finding: Finding,
     published_by: Mapping[str, str],
     found: Iterable[tuple[GroupFacts, Sequence[Finding]]],
-) -> Mapping[Cause, tuple[str, ...]]:
+) -> Mapping[Origin, tuple[str, ...]]:
     """Return the causes of a group's finding, each with its topics, beside what was found of all groups."""
     if not finding.about and finding.code in OF_RELAY:
-        return {Cause(finding.code): ()}
+        return {Origin(finding.code): ()}
     if not finding.about or finding.code not in OF_PUBLISHER:
-        return {Cause(finding.code, group=facts.name): tuple(facts.inputs[index].name for index in finding.about)}
+        return {Origin(finding.code, group=facts.name): tuple(facts.inputs[index].name for index in finding.about)}
     topics = [facts.inputs[index].name for index in finding.about]
     nodes = [published_by.get(topic, "") for topic in topics]
     if len(set(nodes)) > 1 and finding.code is Code.SILENT and _is_all_silent(found):
-        return {Cause(finding.code): tuple(topics)}
-    by_cause: dict[Cause, tuple[str, ...]] = {}
+        return {Origin(finding.code): tuple(topics)}
+    by_cause: dict[Origin, tuple[str, ...]] = {}
     for topic, node in zip(topics, nodes, strict=True):
         # A suggested name fits one topic only, so each misspelled topic is a cause of its own.
         is_misnamed = not node and any(facts.inputs[index].graph.alike for index in finding.about)
-        cause = Cause(finding.code, node, misnamed=tuple(topics) if is_misnamed else ())
+        cause = Origin(finding.code, node, misnamed=tuple(topics) if is_misnamed else ())
         by_cause[cause] = (*by_cause.get(cause, ()), topic)
     return by_cause
 
@@ -118,13 +118,13 @@ def listed(names: Sequence[str]) -> str:
     return all_of(names if rest <= 1 else [*names[:_NAMED], f"{rest} more"])
 
 
-def sentence(cause: Cause, found: Sequence[Found], hit: Sequence[GroupFacts]) -> str:
+def sentence(cause: Origin, found: Sequence[Found], hit: Sequence[GroupFacts]) -> str:
     """Return what a cause does to the groups that it hits, and what to do."""
     suggestion = found[0].finding.suggestion
     return _text(cause, found, hit, f"; {suggestion}" if suggestion else "")
 
 
-def _text(cause: Cause, found: Sequence[Found], hit: Sequence[GroupFacts], to_do: str = "") -> str:
+def _text(cause: Origin, found: Sequence[Found], hit: Sequence[GroupFacts], to_do: str = "") -> str:
     """Word a cause as the worst affected group words it, then add the other topics, the node and the silence."""
     first, own = found[0].finding, found[0].topics
     text, said = first.text, f"{first.text} {first.suggestion}"

@@ -31,7 +31,9 @@ FOUND = {
     ),
     "a transform that has stopped": given_up(Lack.LATE, by=7 * S),
     "a transform of which nothing came since the clock jumped back": given_up(Lack.LATE),
-    "more sets than can wait": given_up(Lack.LATE, by=20 * MS, needed=[90 * MS] * 2, queue_size=2),
+    "more sets than can wait": given_up(
+        Lack.LATE, by=20 * MS, needed=[90 * MS] * 2, queue_size=2, figures={"best_hz": 100.0}
+    ),
     "a transform that began after the message": given_up(Lack.PAST, by=300 * MS, count=1, group=a_silent_group),
     "a frame that no transform names": given_up(Lack.UNKNOWN_FRAME, parent="base_link", child="camera_lens"),
     "a target that no transform names": given_up(Lack.UNKNOWN_FRAME, parent="base_link", child="base_link"),
