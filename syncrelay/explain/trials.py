@@ -412,7 +412,8 @@ class Trials:
 
     def exactly_apart(self, index: int) -> int | None:
         """Return by how much an input is behind the others if that is known by its time scale, else None."""
-        scale = time_scale(int(self.inputs[index].stamps[-1]), self.apart(index))
+        by = self.apart(index)
+        scale = time_scale(int(self.inputs[index].stamps[-1]), by) if by else None
         return None if scale is None else scale.behind
 
     def apart(self, index: int) -> int:
