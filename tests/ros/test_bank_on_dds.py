@@ -33,8 +33,9 @@ _FIRST: Final = chosen(short=1, long=time.time_ns() // _S % _S)
 # A relay that stands still does so for all of its groups.
 _TOGETHER: Final = [kind for kind in KINDS if kind != "stalls"]
 _AT_ONCE: Final = 9
+# In the short form two are looked at, below; tests/conformance has the relay name what it finds over DDS.
 _BATCHES: Final = chosen(
-    short=[("tai", "gone", "two_publishers")],
+    short=[],
     long=[*(tuple(_TOGETHER[n : n + _AT_ONCE]) for n in range(0, len(_TOGETHER), _AT_ONCE)), ("stalls",)],
 )
 # From the start on, too few of their sets leave.

@@ -34,10 +34,8 @@ geometry_msgs/Quaternion rotation
 """,
 }
 _OWN, _HOLDER = "made_own/msg/Own", "made_own/msg/Holder"
-_HOLDING_OWN = {
-    _OWN: "std_msgs/Header header\nfloat64 value\n",
-    _HOLDER: "made_own/Own own\ngeometry_msgs/Vector3Stamped left\n",
-}
+_OWN_TEXT = "std_msgs/Header header\nfloat64 value\n"
+_DEFINITIONS |= {_OWN: _OWN_TEXT, _HOLDER: "made_own/Own own\ngeometry_msgs/Vector3Stamped left\n"}
 _TOPICS = {"/rig/left": VECTOR, "/rig/right": VECTOR}
 _BUNDLE = {"topic": "/front/set", "type": _PAIR}
 _PERIOD = 100 * MS
@@ -195,15 +193,13 @@ def test_a_type_that_is_not_there_is_said(stage: Stage):
 
 
 def test_messages_of_another_definition_than_the_bundles_are_refused_with_both(
-    stage: Stage, tmp_path_factory: pytest.TempPathFactory
+    stage: Stage, pair: MadeMessages, tmp_path_factory: pytest.TempPathFactory
 ):
-    folder = tmp_path_factory.getbasetemp().parent
-    ours = made(folder, _HOLDING_OWN)
-    theirs = made(folder, {**_HOLDING_OWN, _OWN: _HOLDING_OWN[_OWN] + "uint8 more\n"})
+    theirs = made(tmp_path_factory.getbasetemp().parent, {_OWN: f"{_OWN_TEXT}uint8 more\n"})
     plain = stage.environment
     stage.environment = theirs.sourced(plain)
     player = stage.player({"/own": _OWN, "/rig/left": VECTOR}, node="camera")
-    stage.environment = ours.sourced(plain)
+    stage.environment = pair.sourced(plain)
     group = {
         "policy": "approximate_time",
         "slop": "20ms",

@@ -1,12 +1,12 @@
 """Sets of any inputs, as users of Autoware's concatenation expect: lidars that die, return, come late or are lost."""
 
 import random
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import pytest
 
-from syncrelay.sync import ApproximateTime, DropReason, EqualKey, ExactTime, Match, Message, Restamp, SyncGroup
+from syncrelay.sync import ApproximateTime, EqualKey, Match, Message, SyncGroup
 from tests.faults.extent import chosen
 from tests.sync.support.rigs import Tally
 
@@ -71,71 +71,6 @@ def turns_of(left):
     ]
 
 
-@pytest.mark.parametrize("dead", range(3))
-def test_each_of_three_lidars_may_die_and_return(dead):
-    left = played(lidars(), scans([(dead, 3, 6)]))
-    expected = [tuple(None if index == dead and 3 <= turn < 6 else turn for index in range(3)) for turn in range(10)]
-    assert turns_of(left) == expected
-    for match, moment in left:
-        stamps = [message.stamp for message in match.messages if message is not None]
-        # A whole set leaves with its last message, another waits from its second.
-        assert moment == (max(stamps) if len(stamps) == 3 else sorted(stamps)[1] + MAX_WAIT) + 5 * MS
-
-
-@pytest.mark.parametrize("alive", range(3))
-def test_with_two_dead_no_set_of_two_leaves_and_sets_of_one_do(alive):
-    away = [(index, 3, 6) for index in range(3) if index != alive]
-    two = turns_of(played(lidars(quorum=2), scans(away)))
-    one = turns_of(played(lidars(quorum=1), scans(away)))
-    assert two == [(turn,) * 3 for turn in (0, 1, 2, 6, 7, 8, 9)]
-    assert one == [
-        tuple(turn if turn not in (3, 4, 5) or index == alive else None for index in range(3)) for turn in range(10)
-    ]
-
-
-def test_a_lidar_that_never_came_is_waited_for_and_not_needed():
-    assert turns_of(played(lidars(), scans([(0, 0, 99)]))) == [(None, turn, turn) for turn in range(10)]
-
-
-def test_the_cloud_that_comes_when_its_set_has_left_is_late_and_in_no_other():
-    sent = [replace(each, received=each.stamp + 90 * MS) if each.input == 2 else each for each in scans()]
-    left = played(lidars(), sent)
-    assert turns_of(left) == [(turn, turn, None) for turn in range(10)]
-    drops = [each for each, _ in left if not isinstance(each, Match)]
-    assert {(drop.message.input, drop.reason) for drop in drops} <= {(2, DropReason.LATE), (2, DropReason.TOO_FAR)}
-
-
-def test_one_whose_clock_is_off_leaves_the_others_in_peace_and_without_a_wait():
-    sent = [replace(each, stamp=each.stamp + 50 * MS) if each.input == 0 else each for each in scans()]
-    left = [(each, moment) for each, moment in played(lidars(), sent) if isinstance(each, Match)]
-    assert turns_of(left) == [(None, turn, turn) for turn in range(10)]
-
-
-def test_a_required_lidar_is_in_every_set_and_any_other_beside_it():
-    left = played(lidars(required=[0]), scans([(0, 2, 4), (1, 5, 7), (2, 6, 8)]))
-    assert turns_of(left) == [
-        (0, 0, 0), (1, 1, 1), (4, 4, 4), (5, None, 5), (7, 7, None), (8, 8, 8), (9, 9, 9)
-    ]  # fmt: skip
-
-
-def test_the_common_stamp_is_that_of_who_is_there():
-    away = [(0, 0, 1), (1, 1, 2)]
-    for restamp, expected in ((Restamp.EARLIEST, [1, 100]), (Restamp.LATEST, [2, 102]), (1, [1, 100])):
-        left = played(lidars(restamp=restamp), scans(away, turns=2))
-        assert [((each.stamp or 0) - START) // MS for each, _ in left if isinstance(each, Match)] == expected
-
-
-def test_thinning_counts_sets_whoever_is_missing():
-    left = played(lidars(every=2), scans([(0, 3, 6)]))
-    assert [max(filter(None, turns), default=0) for turns in turns_of(left)] == [0, 2, 4, 6, 8]
-
-
-def test_equal_stamps_of_any_two_are_a_set():
-    sent = [replace(each, stamp=START + each.turn * PERIOD) for each in scans([(1, 3, 6)])]
-    left = played(lidars(policy=ExactTime(n_inputs=3, queue_size=10)), sent)
-    assert turns_of(left) == [(turn, None if 3 <= turn < 6 else turn, turn) for turn in range(10)]
-
-
 def test_keys_need_a_required_input():
     with pytest.raises(ValueError, match="required"):
         lidars(policy=EqualKey(n_inputs=3, queue_size=10))
@@ -176,12 +111,6 @@ def test_one_joins_only_what_it_goes_with_all_of():
     sent = [Scan(index, 0, START + stamp, START + 20 * MS + index) for index, stamp in enumerate(stamps)]
     assert turns_of(played(lidars(tolerances=[2 * MS, None, None]), sent)) == [(0, 0, 0)]
     assert turns_of(played(lidars(tolerances=[2 * MS, 8 * MS, None]), sent)) == [(0, 0, None)]
-
-
-def test_a_tolerance_of_half_of_slop_or_more_changes_nothing():
-    sent = [Scan(0, 0, START, START), Scan(1, 0, START + SLOP, START + SLOP), Scan(2, 0, START - 1, START + SLOP)]
-    for wide in (SLOP // 2, SLOP, PERIOD):
-        assert turns_of(played(lidars(tolerances=[wide] * 3), sent)) == turns_of(played(lidars(), sent))
 
 
 def test_required_inputs_are_not_matched_by_tolerances():
