@@ -145,6 +145,22 @@ def test_the_front_page_of_docs_names_every_page():
     assert {*_OF_DOCS} - named - {index} == set()
 
 
+@pytest.mark.parametrize("page", [_ROOT / "README.md", _DOCS / "index.md"], ids=lambda page: page.name)
+def test_a_page_has_the_same_name_in_its_title_and_in_what_lists_it(page):
+    links = re.findall(r"(?<!!)\[([^\]]+)\]\(([\w/]+\.md)\)", _prose(_PAGES[page]))
+    listed = {(name, page.parent / target) for name, target in links if (page.parent / target) in _OF_DOCS}
+    titles = {path: re.findall(r"^# (.+)$", _prose(_PAGES[path]), re.MULTILINE)[0] for path in _OF_DOCS}
+    # In the midst of a sentence a name may begin with a small letter.
+    wrong = [(name, titles[path]) for name, path in listed if name.lower() != titles[path].lower()]
+    assert listed
+    assert wrong == []
+
+
+def test_the_sidebar_has_six_groups():
+    groups = re.findall(r"^## (.+)$", _PAGES[_DOCS / "index.md"], re.MULTILINE)
+    assert groups == ["Start", "Values", "Watch", "Deploy", "Recordings", "Come from"]
+
+
 def _prose(text):
     return re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
 

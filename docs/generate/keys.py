@@ -13,6 +13,11 @@ from syncrelay.config.models import Group, Topic
 from syncrelay.config.schema import REF, Schema, json_schema
 
 _SCHEMA = json_schema()
+# Editors show these with each key; the page says them once.
+_UNITS = (
+    " A number is seconds, a string has a unit (ns, us, ms, s, min).",
+    " A number is Hz, a string has a unit (Hz, kHz).",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +61,7 @@ def of_topic() -> Iterator[_Key]:
 def policies() -> Iterator[_Policy]:
     """Yield what each policy has beside the keys of every group and topic."""
     form = file_format()
+    shown: dict[_Key, str] = {}
     for name, model in form.groups.items():
         schema, topic = (_SCHEMA["definitions"][each.__name__] for each in (model, form.topics[name]))
         own = [key for key in model.model_fields if key not in Group.model_fields]
@@ -63,14 +69,23 @@ def policies() -> Iterator[_Policy]:
         yield _Policy(
             name,
             schema["properties"]["policy"]["description"],
-            tuple(_key(key, schema) for key in own),
+            tuple(_once(_key(key, schema), shown, name) for key in own),
             tuple(_key(key, topic) for key in of_topics),
         )
 
 
+def _once(key: _Key, shown: dict[_Key, str], policy: str) -> _Key:
+    """Return a key, or where to find it if another policy has the same."""
+    first = shown.setdefault(key, policy)
+    return key if first == policy else _Key(key.name, f"As for [`{first}`](#{first}).", None)
+
+
 def _key(name: str, model: Schema) -> _Key:
     schema = model["properties"][name]
-    return _Key(name, linked(schema.get("description", "")), " ".join(_takes(name, schema)) or None)
+    meaning = schema.get("description", "")
+    for units in _UNITS:
+        meaning = meaning.replace(units, "")
+    return _Key(name, linked(meaning), " ".join(_takes(name, schema)) or None)
 
 
 def _takes(name: str, schema: Schema) -> Iterator[str]:
