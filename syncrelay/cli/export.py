@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, cast
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
 from syncrelay.cli.fleet_options import add_fleet_options
-from syncrelay.cli.parser import IMAGE_FORMATS, Parser
+from syncrelay.cli.parser import COMPRESSIONS, IMAGE_FORMATS, Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import UsageError
 from syncrelay.printable import printable
 
 if TYPE_CHECKING:
     from syncrelay.config import Config
+    from syncrelay.recordings.bag.mcap_output import Compression
     from syncrelay.recordings.datasets.images import ImageFormat
     from syncrelay.recordings.fleet.run import Run
     from syncrelay.recordings.fleet.task import Source
@@ -52,6 +53,12 @@ def parser() -> Parser:
         " in --images jpeg --images /depth=png",
     )
     parser.add_argument("--raw", action="store_true", help="write each message as the CDR bytes that were recorded")
+    parser.add_argument(
+        "--compression",
+        choices=COMPRESSIONS,
+        metavar="HOW",
+        help="how Parquet and MCAP are packed: zstd (default), lz4, or none, the quickest: raw pixels pack badly",
+    )
     add_fleet_options(parser, "-o", "--output")
     return parser
 
@@ -67,6 +74,8 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
         whole = "--format mcap writes whole messages"
         why = whole if arguments.format == "mcap" else "`export:` in the file says what LeRobot gets"
         parser.error(f"--fields, --images and --raw are for tables: {why}")
+    if arguments.compression and arguments.format == "lerobot":
+        parser.error("--compression is for Parquet and MCAP: LeRobot's videos are packed already")
     from syncrelay.cli.fleet import do_on_many
     from syncrelay.cli.run import require_groups
     from syncrelay.config import load
@@ -75,10 +84,11 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     require_groups(arguments.group, config, arguments.config)
     chosen = tuple(group for group in config.groups if not arguments.group or group.name in arguments.group)
     config = replace(config, groups=chosen)
+    compression: Compression = arguments.compression or "zstd"
     if arguments.format == "mcap":
         from syncrelay.recordings.fleet.tasks import ReplayTask
 
-        return do_on_many(ReplayTask.of(config, (), 0), arguments.bags, arguments)
+        return do_on_many(ReplayTask.of(config, (), 0, compression), arguments.bags, arguments)
     if arguments.format == "lerobot":
         return _export_lerobot(config, arguments)
     from syncrelay.recordings.datasets.reading import resolved
@@ -87,7 +97,7 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
 
     by_topic, others = _formats(arguments.images)
     content = Content(
-        resolved(_parsed(arguments.fields), config), resolved(by_topic, config), others, raw=arguments.raw
+        resolved(_parsed(arguments.fields), config), resolved(by_topic, config), others, arguments.raw, compression
     )
     return do_on_many(ParquetTask.of(config, content), arguments.bags, arguments)
 

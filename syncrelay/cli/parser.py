@@ -17,6 +17,7 @@ _WIDTH: Final = 78
 # 31 years: timers take it, and so do stamps.
 _MOST_S: Final = 1_000_000_000
 IMAGE_FORMATS: Final = ("png", "jpeg")
+COMPRESSIONS: Final = ("zstd", "lz4", "none")
 """What `export --images` can make of an image."""
 
 # The metavars of arguments that name YAML files to read.

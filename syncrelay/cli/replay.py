@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, say
 from syncrelay.cli.fleet_options import add_fleet_options, require_into
-from syncrelay.cli.parser import Parser, seed
+from syncrelay.cli.parser import COMPRESSIONS, Parser, seed
 from syncrelay.cli.stop import StopRequest
 from syncrelay.printable import printable
 from syncrelay.urls import redacted
@@ -40,6 +40,9 @@ def parser() -> Parser:
     parser.add_argument(
         "-o", "--output", metavar="OUT", help="write the sets as a recording: OUT.mcap, or OUT as a rosbag2 folder"
     )
+    parser.add_argument(
+        "--compression", choices=COMPRESSIONS, metavar="HOW", help="how OUT is packed: zstd (default), lz4 or none"
+    )
     parser.add_argument("--json", action="store_true", help="print a line of JSON for each set")
     parser.add_argument("--drops", action="store_true", help="print a line of JSON for each message that is dropped")
     parser.add_repeatable(
@@ -65,6 +68,8 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
         parser.error("--seed goes with --what-if")
     seed_of_faults = arguments.seed or 0
     require_into(parser, arguments)
+    if arguments.compression and not (arguments.output or arguments.into):
+        parser.error("--compression goes with --output and --into")
     if arguments.into is None:
         return _replay(arguments, what_if, seed_of_faults)
     if arguments.output or arguments.json or arguments.drops:
@@ -73,7 +78,7 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     from syncrelay.config import load
     from syncrelay.recordings.fleet.tasks import ReplayTask
 
-    task = ReplayTask.of(load(*arguments.config), what_if, seed_of_faults)
+    task = ReplayTask.of(load(*arguments.config), what_if, seed_of_faults, arguments.compression or "zstd")
     return do_on_many(task, arguments.bags, arguments)
 
 
@@ -107,7 +112,7 @@ def _replay(arguments: Namespace, what_if: "tuple[Fault, ...]", seed_of_faults: 
             remark(printable(f"faults laid over the recording (seed {seed_of_faults}): {faults}"))
         bindings = bind(config, recording)
         _remark_all(problem for binding in bindings for problem in binding.problems)
-        written = _written(arguments.output, bindings, opened)
+        written = _written(arguments, bindings, opened)
         listeners = [*_printing(arguments, bindings), *([] if written is None else [written.take])]
         with reading(recording):
             results = replay_groups(recording, bindings, listeners=listeners)
@@ -167,16 +172,16 @@ def _printing(arguments: Namespace, bindings: "Sequence[GroupBinding]") -> "Iter
         yield print_drop
 
 
-def _written(output: str | None, bindings: "Sequence[GroupBinding]", opened: ExitStack) -> "SetWriter | None":
+def _written(arguments: Namespace, bindings: "Sequence[GroupBinding]", opened: ExitStack) -> "SetWriter | None":
     """Return what writes the recording, if one is to be written, and say what there is to say of it."""
-    if output is None:
+    if arguments.output is None:
         return None
     from syncrelay.recordings.bag import Encoding
     from syncrelay.recordings.bag.mcap_output import McapOutput
     from syncrelay.recordings.bag.writing import SetWriter
 
     channels = (channel for binding in bindings for each in binding.inputs for channel in each.channels)
-    recording = opened.enter_context(McapOutput(output))
+    recording = opened.enter_context(McapOutput(arguments.output, compression=arguments.compression or "zstd"))
     if any(channel.encoding is Encoding.ROS1 for channel in channels):
         remark("this is a ROS 1 recording: its messages are written as ROS 2 CDR, without header.seq")
     writer = SetWriter(recording)

@@ -124,6 +124,21 @@ def test_mcap_is_what_replay_writes(rigged, tmp_path):
     assert written.read_bytes() == (tmp_path / "sets.mcap").read_bytes()
 
 
+@pytest.mark.parametrize(
+    ("how", "chunk", "column"), [("zstd", "zstd", "ZSTD"), ("lz4", "lz4", "LZ4"), ("none", "", "UNCOMPRESSED")]
+)
+def test_what_is_written_is_packed_as_asked(how, chunk, column, rigged, tmp_path):
+    words = ["rig.mcap", "--config", "demo.yaml", "--compression", how]
+    assert run("replay", *words, "-o", str(tmp_path / "sets.mcap"), folder=rigged).returncode == 0
+    with (tmp_path / "sets.mcap").open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    assert {each.compression for each in summary.chunk_indexes} == {chunk}
+    assert run("export", *words, "-o", str(tmp_path / "out"), folder=rigged).returncode == 0
+    group = exported(tmp_path, "camera_lidar").metadata.row_group(0)
+    assert {group.column(index).compression for index in range(group.num_columns)} == {column}
+
+
 def test_a_group_without_sets_has_a_file_without_rows(tmp_path):
     write_mcap(tmp_path / "bag.mcap", [frame for frame in rig() if frame.topic == "/camera"])
     (tmp_path / "pair.yaml").write_text(PAIR)

@@ -91,6 +91,8 @@ _REFUSED = f"""
 2 | export rig.mcap --config f.yaml -o new --images png --images jpeg | --images jpeg: a format is named twice for all
 2 | export rig.mcap --config f.yaml -o new --raw --images png | --raw keeps each message as it is
 2 | export rig.mcap --config f.yaml -o new --format mcap --raw | --fields, --images and --raw are for tables: --format
+2 | export rig.mcap --config f.yaml -o new --format lerobot --compression lz4 | --compression is for Parquet and MCAP
+2 | replay rig.mcap --config f.yaml --compression none | --compression goes with --output and --into
 2 | observe --config a.yaml --config b.yaml --write new.yaml | --write goes with one --config FILE
 2 | observe --config conf --write new.yaml | --write goes with one --config FILE: conf has 2
 1 | observe --config f.yaml --write mine.yaml | mine.yaml: already exists and is not overwritten

@@ -4,10 +4,10 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, Final, Self
+from typing import Any, BinaryIO, Final, Literal, Self, TypeAlias
 
 import yaml
-from mcap.writer import Writer
+from small_mcap import CompressionType, McapWriter
 
 from syncrelay.config.profile import Profile
 from syncrelay.output_files import cannot_be_written, local_path, require_new, written_whole
@@ -16,6 +16,9 @@ from syncrelay.recordings.bag.recording import Definition, Encoding
 
 MCAP_SUFFIX: Final = ".mcap"
 _PROFILE: Final = "ros2"
+Compression: TypeAlias = Literal["zstd", "lz4", "none"]
+"""How what is written is packed."""
+
 # The version of rosbag2's metadata that Jazzy writes.
 _METADATA_VERSION: Final = 9
 
@@ -35,7 +38,7 @@ class Output:
 class McapOutput:
     """Writes CDR messages; a context manager. After an error there is no recording."""
 
-    def __init__(self, place: Path | str) -> None:
+    def __init__(self, place: Path | str, *, compression: Compression = "zstd") -> None:
         """Start a file (the name ends in .mcap) or a folder, at a path or a URL; raises OutputError if it exists."""
         is_file = str(place).endswith(MCAP_SUFFIX)
         with ExitStack() as opened:
@@ -52,7 +55,7 @@ class McapOutput:
             self._path = scratch if is_file else scratch / f"{scratch.name}_0{MCAP_SUFFIX}"
             self._file = self._path.open("xb")
             opened.callback(_close, self._file)
-            self._writer = Writer(self._file)
+            self._writer = McapWriter(self._file, compression=CompressionType[compression.upper()])
             self._writer.start(_PROFILE)
             self._opened = opened.pop_all()
         self._outputs: list[Output] = []
@@ -69,7 +72,7 @@ class McapOutput:
         if error is not None:
             return self._opened.__exit__(kind, error, trace)
         with self._opened:
-            self._writer.finish()  # type: ignore[no-untyped-call]  # mcap's
+            self._writer.finish()
             self._file.close()
             if self._folder is not None:
                 text = yaml.safe_dump(self._metadata(), sort_keys=False)
@@ -86,10 +89,12 @@ class McapOutput:
         if type_name not in self._schemas:
             text = definition.text.encode() if definition else b""
             encoding = definition.format if definition else ""
-            self._schemas[type_name] = self._writer.register_schema(type_name, encoding, text)
+            self._schemas[type_name] = len(self._schemas) + 1
+            self._writer.add_schema(self._schemas[type_name], type_name, encoding, text)
         profiles = yaml.safe_dump([write_profile(qos)], sort_keys=False).strip()
         about = {"offered_qos_profiles": profiles, "topic_type_hash": type_hash}
-        number = self._writer.register_channel(topic, Encoding.CDR.value, self._schemas[type_name], about)
+        number = len(self._outputs) + 1
+        self._writer.add_channel(number, topic, Encoding.CDR.value, self._schemas[type_name], about)
         output = Output(number, topic, type_name, type_hash, qos)
         self._outputs.append(output)
         return output

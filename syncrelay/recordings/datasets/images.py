@@ -1,8 +1,11 @@
 """Images encoded as PNG or JPEG."""
 
 import io
-import sys
+import os
+import struct
+import zlib
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from types import MappingProxyType
 from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
@@ -16,7 +19,12 @@ IMAGE: Final = "sensor_msgs/msg/Image"
 NEEDED: Final = ("height", "width", "encoding", "is_bigendian", "step", "data")
 """The fields of an Image that its pixels are read from."""
 
-# Higher levels take twice the time to save a few per cent.
+_PNG_BEGIN: Final = b"\x89PNG\r\n\x1a\n"
+# PNG's names of colours, by the channels of a pixel; and its filter that stores each byte's difference to the pixel
+# before, which packs pictures of cameras as well as the best of all five for each row, in an eighth of the time.
+_COLOURS: Final = MappingProxyType({1: 0, 3: 2, 4: 6})
+_SUB: Final = 1
+# Higher levels take a tenth more time to save less than one per cent.
 _PNG_LEVEL: Final = 1
 _JPEG_QUALITY: Final = 95
 # libjpeg's JPEG_MAX_DIMENSION. Pillow gives its error as one of the file that is written.
@@ -96,14 +104,19 @@ class ImageColumn:
 
     def encode(self, decoded: pa.ChunkedArray, arrow: pa.StructType) -> pa.ChunkedArray:
         """Return the encoded column; `arrow` is its type."""
-        rows = [None if not row.is_valid else self._row(row.as_py(), arrow) for row in decoded]
+        # The encoders let other threads run.
+        with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+            rows = list(pool.map(lambda row: self._row(row, arrow), decoded))
+        self.undecodable += rows.count(None) - decoded.null_count
         return pa.chunked_array([pa.array(rows, type=arrow)])
 
-    def _row(self, image: dict[str, Any], arrow: pa.StructType) -> dict[str, Any] | None:
+    def _row(self, row: pa.StructScalar, arrow: pa.StructType) -> dict[str, Any] | None:
+        if not row.is_valid:
+            return None
+        image = {name: row[name].as_buffer() if name == "data" else row[name].as_py() for name in row}
         try:
             content = encoded(pixels_of(image, self._topic), self._format, self._topic)
         except FrameError:
-            self.undecodable += 1
             return None
         whole = {**image, "format": self._format, "data": content}
         return {field.name: whole[field.name] for field in arrow}
@@ -111,22 +124,41 @@ class ImageColumn:
 
 def encoded(pixels: np.ndarray[Any, Any], image_format: ImageFormat, topic: str) -> bytes:
     """Return pixels as a file of this format; raises BagError where it cannot hold them."""
+    return _png(pixels) if image_format == "png" else _jpeg(pixels, topic)
+
+
+def _png(pixels: np.ndarray[Any, Any]) -> bytes:
+    """Return a PNG file (W3C, third edition) of pixels [height, width] or [height, width, channels]."""
+    from isal import isal_zlib  # noqa: PLC0415  an extra's, and needed here alone
+
+    height, width = pixels.shape[:2]
+    channels = pixels.shape[2] if pixels.ndim > 2 else 1  # noqa: PLR2004  has channels
+    size = pixels.dtype.itemsize
+    plain = np.ascontiguousarray(pixels, dtype=pixels.dtype.newbyteorder(">")).view(np.uint8).reshape(height, -1)
+    rows = np.empty((height, 1 + plain.shape[1]), np.uint8)
+    first = channels * size
+    rows[:, 0] = _SUB
+    rows[:, 1 : 1 + first] = plain[:, :first]
+    np.subtract(plain[:, first:], plain[:, :-first], out=rows[:, 1 + first :])
+    head = struct.pack(">IIBBBBB", width, height, 8 * size, _COLOURS[channels], 0, 0, 0)
+    parts = {b"IHDR": head, b"IDAT": isal_zlib.compress(rows, _PNG_LEVEL), b"IEND": b""}
+    return _PNG_BEGIN + b"".join([_chunk(name, content) for name, content in parts.items()])
+
+
+def _chunk(name: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(content, zlib.crc32(name)))
+
+
+def _jpeg(pixels: np.ndarray[Any, Any], topic: str) -> bytes:
     from PIL import Image  # noqa: PLC0415  an extra's, and needed here alone
 
-    if image_format == "jpeg" and pixels.dtype.itemsize > 1:
+    if pixels.dtype.itemsize > 1:
         raise BagError(f"{topic}: JPEG cannot hold 16 bit images: use --images {topic}=png")
     height, width = pixels.shape[:2]
-    if image_format == "jpeg" and max(height, width) > _LONGEST_JPEG:
+    if max(height, width) > _LONGEST_JPEG:
         limit = f"at most {_LONGEST_JPEG:,} pixels a side, and one has {width:,} x {height:,}"
         raise BagError(f"{topic}: JPEG holds images of {limit}: use --images {topic}=png")
-    order = "<" if sys.byteorder == "little" else ">"
-    plain = np.ascontiguousarray(pixels, dtype=pixels.dtype.newbyteorder(order))
-    picture = Image.fromarray(plain)
-    if image_format == "jpeg" and picture.mode == "RGBA":
-        picture = picture.convert("RGB")
+    picture = Image.fromarray(np.ascontiguousarray(pixels))
     file = io.BytesIO()
-    if image_format == "png":
-        picture.save(file, "PNG", compress_level=_PNG_LEVEL)
-    else:
-        picture.save(file, "JPEG", quality=_JPEG_QUALITY)
+    (picture.convert("RGB") if picture.mode == "RGBA" else picture).save(file, "JPEG", quality=_JPEG_QUALITY)
     return file.getvalue()

@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from syncrelay.output_files import cannot_be_written
+from syncrelay.recordings.bag.mcap_output import Compression
 from syncrelay.recordings.datasets.reading import SetsOf
 from syncrelay.recordings.datasets.tables import SetTable
 
@@ -16,7 +17,7 @@ from syncrelay.recordings.datasets.tables import SetTable
 _ZSTD_LEVEL: Final = 1
 
 
-def write_parquet(sets: SetsOf, steps: Iterable[None], folder: Path) -> None:
+def write_parquet(sets: SetsOf, steps: Iterable[None], folder: Path, *, compression: Compression) -> None:
     """Write the sets of each group that leave in the steps of a replay, a row group at a time.
 
     Each group has a file in the folder. Raises OutputError where a file cannot be written.
@@ -27,7 +28,7 @@ def write_parquet(sets: SetsOf, steps: Iterable[None], folder: Path) -> None:
         def write(group: SetTable, table: pa.Table, **options: int) -> None:
             if group not in writers:
                 path = folder / f"{group.binding.group.name}.parquet"
-                writers[group] = opened.enter_context(_open(path, table.schema))
+                writers[group] = opened.enter_context(_open(path, table.schema, compression))
             writers[group].write_table(table, **options)
 
         try:
@@ -41,7 +42,7 @@ def write_parquet(sets: SetsOf, steps: Iterable[None], folder: Path) -> None:
             raise cannot_be_written(folder, error) from error
 
 
-def _open(path: Path, schema: pa.Schema) -> pq.ParquetWriter:
+def _open(path: Path, schema: pa.Schema, compression: Compression) -> pq.ParquetWriter:
     leaves = [*_leaves("", schema)]
     texts = [name for name, kind in leaves if pa.types.is_string(kind)]
     # Statistics are of no use for pictures and for elements of lists.
@@ -51,8 +52,8 @@ def _open(path: Path, schema: pa.Schema) -> pq.ParquetWriter:
     return pq.ParquetWriter(
         path,
         schema,
-        compression={name: "none" if name in pictures else "zstd" for name, _ in leaves},
-        compression_level={name: _ZSTD_LEVEL for name, _ in leaves if name not in pictures},
+        compression={name: "none" if name in pictures else compression for name, _ in leaves},
+        compression_level={name: _ZSTD_LEVEL for name, _ in leaves if name not in pictures and compression == "zstd"},
         use_dictionary=texts or False,
         write_statistics=compared or False,
         write_page_index=True,

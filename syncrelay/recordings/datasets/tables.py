@@ -21,6 +21,7 @@ from syncrelay.config.wording import counted
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag.bindings import GroupBinding, Input
 from syncrelay.recordings.bag.definitions import typestore
+from syncrelay.recordings.bag.mcap_output import Compression
 from syncrelay.recordings.bag.recording import Channel, Definition
 from syncrelay.recordings.bag.replay import received
 from syncrelay.recordings.bag.writing import Outgoing, outgoing
@@ -50,6 +51,8 @@ class Content:
     other_images: ImageFormat | None = None
     """The format of the images of all other inputs; None leaves raw pixels."""
     raw: bool = False
+    compression: Compression = "zstd"
+    """How the columns of a Parquet file are packed, but for pictures."""
 
 
 class SetTable:

@@ -49,6 +49,7 @@ class ParquetTask:
             "images": dict(content.images),
             "other_images": content.other_images,
             "raw": content.raw,
+            "compression": content.compression,
         }
         fingerprint = fingerprint_of("export", config=what_decides_sets(config.groups), options=options)
         return cls(config, content, fingerprint)
@@ -59,7 +60,7 @@ class ParquetTask:
             bindings = bind(self.config, recording)
             sets = SetsOf(bindings, self.content, name=source.name)
             replay = Replay(recording, bindings, listeners=sets.listeners)
-            write_parquet(sets, replay.steps(), folder)
+            write_parquet(sets, replay.steps(), folder, compression=self.content.compression)
             results = replay.results()
             facts = {**about(recording, bindings, more=sets.faults()), **few_sets(recording, bindings, results)}
             return {**facts, "groups": [counts_of(result) for result in results]}

@@ -15,7 +15,7 @@ from syncrelay.recordings.analysis.proposal import bind_file_or_topics
 from syncrelay.recordings.analysis.report_json import as_json, inventory_as_json
 from syncrelay.recordings.bag import Recording, open_recording
 from syncrelay.recordings.bag.bindings import GroupBinding, bind
-from syncrelay.recordings.bag.mcap_output import McapOutput
+from syncrelay.recordings.bag.mcap_output import Compression, McapOutput
 from syncrelay.recordings.bag.replay import GroupResult
 from syncrelay.recordings.bag.replay import replay as replay_groups
 from syncrelay.recordings.bag.what_if import Disturbed
@@ -46,21 +46,23 @@ class ReplayTask:
     config: Config
     what_if: tuple[Fault, ...]
     seed: int
+    compression: Compression
     fingerprint: str
 
     @classmethod
-    def of(cls, config: Config, what_if: tuple[Fault, ...], seed: int) -> Self:
+    def of(cls, config: Config, what_if: tuple[Fault, ...], seed: int, compression: Compression) -> Self:
         """Return the task of a file. Faults that are random are drawn with `seed`."""
         options: dict[str, JSON] = {"what_if": [fault.written for fault in what_if], "seed": seed if what_if else 0}
+        options["compression"] = compression
         fingerprint = fingerprint_of("replay", config=what_decides_outputs(config.groups), options=options)
-        return cls(config, what_if, seed, fingerprint)
+        return cls(config, what_if, seed, compression, fingerprint)
 
     def run(self, source: Source, folder: Path) -> dict[str, JSON]:
         """See Task."""
         with closing(open_recording([source.place])) as plain, eased_collector():
             recording = Disturbed(plain, self.what_if, seed=self.seed) if self.what_if else plain
             bindings = bind(self.config, recording)
-            with McapOutput(folder / SETS) as output:
+            with McapOutput(folder / SETS, compression=self.compression) as output:
                 writer = SetWriter(output)
                 for binding in bindings:
                     writer.begin(binding)

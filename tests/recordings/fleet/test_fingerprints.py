@@ -173,7 +173,7 @@ def tasks_of(text: str) -> dict[str, Task]:
         "parquet": ParquetTask.of(only(config, front), Content()),
         "lerobot": LerobotTask.of(config),
         "analyze": AnalyzeTask.of(file="file.yaml", text=text, topics=()),
-        "mcap": ReplayTask.of(config, (), 0),
+        "mcap": ReplayTask.of(config, (), 0, "zstd"),
     }
 
 
