@@ -13,8 +13,6 @@ from syncrelay.config.profile import Mismatch
 from tests.bank.rig import LONGEST_S, Flow, Rig, S, spans
 from tests.explain.scenario import MS
 
-_YEAR: Final = 365.2425 * 86400 * S
-
 
 @dataclass(frozen=True, slots=True)
 class Truth:

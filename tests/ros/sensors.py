@@ -49,17 +49,6 @@ def play(stage: Stage, frames: Sequence[Frame], *, node: str = "driver", **qos: 
     return player
 
 
-def warnings_of(relay: Process, group: str) -> list[dict[str, Any]]:
-    """What a relay whose log is in JSON has warned of that is about this group, or about none."""
-    *lines, _ = relay.stderr.split("\n")
-    said = [json.loads(line) for line in lines if line.startswith("{")]
-    return [
-        line
-        for line in said
-        if line["level"] not in ("info", "debug") and group in line.get("groups", [line.get("group", group)])
-    ]
-
-
 def assert_looked_at_a_healthy_rig(look: Process) -> None:
     """One that observes a healthy group, as JSON, found it so, or what a busy machine makes of it; its end agrees."""
     code = look.wait()

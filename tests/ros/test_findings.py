@@ -7,12 +7,10 @@ from typing import Any
 import pytest
 
 from tests.ros.cdr_messages import VECTOR, serialize
-from tests.ros.configs import config, inputs
 from tests.ros.processes import wait_until
-from tests.ros.sensors import APPROXIMATE, OF_A_BUSY_MACHINE, front, play, stream, warnings_of
+from tests.ros.sensors import front, play, stream
 from tests.ros.stage import Stage
-from tests.ros.status import ANY_PORT, findings, get, status, wait_for_finding
-from tests.ros.streams import merged
+from tests.ros.status import get, status
 
 pytestmark = pytest.mark.ros
 
@@ -50,17 +48,3 @@ def test_messages_that_dds_lost_while_the_relay_stood_still_are_counted_and_the_
     counted = re.search(r'syncrelay_messages_lost_total\{group="front",topic="/camera"\} (\S+)', get(relay, "/metrics"))
     assert counted
     assert float(counted[1]) > 0
-
-
-def test_a_relay_that_is_alone_says_so_and_nothing_of_each_topic(stage: Stage):
-    topics = {"front": ["/front/camera", "/front/lidar"], "rear": ["/rear/camera", "/rear/lidar", "/rear/radar"]}
-    groups = {name: {**APPROXIMATE, "topics": inputs(dict.fromkeys(each, VECTOR))} for name, each in topics.items()}
-    relay = stage.relay(config(groups, metrics=ANY_PORT), "--log-format", "json")
-    for name in topics:
-        wait_for_finding(relay, "alone", name, naming=[f"{stage.domain}", "LOCALHOST", "`syncrelay doctor"])
-    relay.wait_until(lambda: bool(warnings_of(relay, "front")), "a warning")
-    play(stage, merged(*(stream(topic, hz=10) for each in topics.values() for topic in each)))
-    for name in topics:
-        wait_until(lambda name=name: "healthy" in findings(relay, name), f"sets of {name}")
-        said = {line.get("finding", "") for line in warnings_of(relay, name)}
-        assert {"alone"} <= said <= {"alone"} | OF_A_BUSY_MACHINE

@@ -42,15 +42,6 @@ class Scan:
     received: int
 
 
-def scans(away=(), *, turns=10, delay=5 * MS, lidars=3):
-    """Turns of lidars, one millisecond apart, without those that are `away`: (lidar, first turn, turn of return)."""
-    for turn in range(turns):
-        for index in range(lidars):
-            if not any(index == which and first <= turn < back for which, first, back in away):
-                stamp = START + turn * PERIOD + index * MS
-                yield Scan(index, turn, stamp, stamp + delay)
-
-
 def played(group, sent):
     """The sets that leave and when, each deadline kept to the nanosecond."""
     left = []
