@@ -10,7 +10,7 @@ import pytest
 
 from syncrelay.cli.demo import isolation
 from tests.cli.terminals import on_terminal
-from tests.ros.processes import DEADLINE_S, wait_until
+from tests.ros.processes import DEADLINE_S
 
 _DEMO = [sys.executable, "-m", "syncrelay", "demo"]
 
@@ -99,48 +99,29 @@ def test_it_can_be_stopped_before_the_sensors_publish(stage):
     assert not any(map(running, sensors))
 
 
-@pytest.mark.ros
-def test_it_fails_if_no_set_came(stage):
-    never = "itertools.repeat(schedule.Shot(0, 0, 1 << 62))"
-    stage.before_each_sensor(
-        f"import itertools; from syncrelay.rig import schedule; schedule.schedule = lambda *_, **__: {never}"
-    )
-    demo = stage.start("demo", [*_DEMO, "--seconds", "1"])
-    assert demo.wait() == 1
-    assert re.search(r"^camera_lidar: .*no set yet", demo.stdout, re.MULTILINE)
+# No sensor sends anything, and one of them hangs in DDS at its end.
+_ILL = """\
+import itertools, sys, time
+from rclpy.node import Node
+from syncrelay.rig import schedule
+schedule.schedule = lambda *_, **__: itertools.repeat(schedule.Shot(0, 0, 1 << 62))
+if 'imu' in sys.orig_argv: Node.destroy_node = lambda self: time.sleep(600)
+"""
 
 
 @pytest.mark.ros
-def test_it_removes_what_a_sensor_left_that_hung_in_dds_and_was_killed(stage):
-    stage.before_each_sensor(
-        "import sys, time; from rclpy.node import Node\n"
-        "if 'imu' in sys.orig_argv: Node.destroy_node = lambda self: time.sleep(600)"
-    )
+def test_it_fails_if_no_set_came_and_removes_what_a_sensor_left_that_was_killed(stage):
+    stage.before_each_sensor(_ILL)
     demo = stage.start("demo", [*_DEMO, "--seconds", "2"])
     demo.wait_until(lambda: "lidar_imu" in demo.stdout, "a first line")
     _, _, imu = children(demo.pid)
     stage.note_shared_memory()
     demo.wait_for_log("imu to end;")
     os.kill(imu, signal.SIGKILL)
-    demo.wait()
+    assert demo.wait() == 1
+    assert re.search(r"^camera_lidar: .*no set yet", demo.stdout, re.MULTILINE)
     assert "the rig's imu ended with exit code -9" in demo.stderr
     assert stage.left_in_shared_memory() == set()
-
-
-_HANGS = (
-    "import time; from rclpy.node import Node; from syncrelay.rig import processes; processes.LEAVE_WITHIN_S = 1; "
-    "Node.destroy_node = lambda self: time.sleep(600)"
-)
-
-
-@pytest.mark.ros
-def test_the_rig_does_not_outlive_it_though_it_hangs(stage):
-    stage.before_each_sensor(_HANGS)
-    demo = stage.start("demo", _DEMO)
-    demo.wait_until(lambda: "lidar_imu" in demo.stdout, "a first line")
-    sensors = children(demo.pid)
-    demo.send(signal.SIGKILL)
-    wait_until(lambda: not any(map(running, sensors)), "the end of the rig")
 
 
 @pytest.mark.ros

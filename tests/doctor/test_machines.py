@@ -24,14 +24,18 @@ def base(tmp_path):
 
 def examine(environ, *words, command=None):
     """The exit code and what the doctor found: severity and text by code."""
+    code, diagnoses = diagnosed(environ, *words, command=command)
+    return code, {each["code"]: each for each in diagnoses}
+
+
+def diagnosed(environ, *words, command=None):
     argv = command or [sys.executable, "-m", "syncrelay", "doctor", "--json", *words]
     done = preloaded.run(argv, environ=environ, folder=ROOT)
     assert done.stdout, done.stderr
     report = json.loads(done.stdout)
     assert done.returncode == (0 if report["ok"] else 1)
-    found = {each["code"]: each for each in report["diagnoses"]}
-    assert report["ok"] == all(each["severity"] == "info" for each in found.values())
-    return done.returncode, found
+    assert report["ok"] == all(each["severity"] == "info" for each in report["diagnoses"])
+    return done.returncode, report["diagnoses"]
 
 
 @pytest.mark.ros
@@ -158,32 +162,26 @@ def test_a_missing_package_and_remaps_that_make_names_meet_are_faults_of_the_env
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize(
-    ("module", "fault"),
-    [
-        (
-            "raise ImportError('libacme.so: cannot open shared object file')",
-            "libacme.so: cannot open shared object file",
-        ),
-        ("import os; os.abort()", "the process was ended by signal 6"),
-    ],
-    ids=["raises", "kills"],
-)
-def test_a_type_whose_library_does_not_load_is_named_with_its_topics(module, fault, base, tmp_path):
-    (tmp_path / "acme_msgs/msg").mkdir(parents=True)
-    (tmp_path / "acme_msgs/__init__.py").touch()
-    (tmp_path / "acme_msgs/msg/__init__.py").write_text(module)
-    index = tmp_path / "share/ament_index/resource_index"
-    (index / "rosidl_interfaces").mkdir(parents=True)
-    (index / "rosidl_interfaces/acme_msgs").write_text("msg/Thing.idl\nmsg/Thing.msg\n")
-    (tmp_path / "share/acme_msgs/msg").mkdir(parents=True)
-    (tmp_path / "share/acme_msgs/msg/Thing.msg").write_text("std_msgs/Header header\n")
-    (tmp_path / "f.yaml").write_text(GOOD.replace("/b, type: sensor_msgs/msg/Image", "/b, type: acme_msgs/msg/Thing"))
+def test_types_whose_libraries_do_not_load_are_named_with_their_topics(base, tmp_path):
+    index = tmp_path / "share/ament_index/resource_index/rosidl_interfaces"
+    index.mkdir(parents=True)
+    why = "libacme.so: cannot open shared object file"
+    for package, module in (("acme_msgs", f"raise ImportError({why!r})"), ("dead_msgs", "import os; os.abort()")):
+        (tmp_path / package / "msg").mkdir(parents=True)
+        (tmp_path / package / "__init__.py").touch()
+        (tmp_path / package / "msg/__init__.py").write_text(module)
+        (index / package).write_text("msg/Thing.idl\nmsg/Thing.msg\n")
+        (tmp_path / "share" / package / "msg").mkdir(parents=True)
+        (tmp_path / "share" / package / "msg/Thing.msg").write_text("std_msgs/Header header\n")
+    text = GOOD.replace("/b, type: sensor_msgs/msg/Image", "/b, type: acme_msgs/msg/Thing")
+    (tmp_path / "f.yaml").write_text(f"{text}      - {{topic: /c, type: dead_msgs/msg/Thing}}\n")
     prefixes = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get("AMENT_PREFIX_PATH"), sys.prefix]))
     environ = {**base, "PYTHONPATH": f"{ROOT}:{tmp_path}", "AMENT_PREFIX_PATH": prefixes}
-    _, found = examine(environ, "--config", str(tmp_path / "f.yaml"))
-    assert fault in found["type_unusable"]["what"]
-    assert "the relay receives nothing on /b, so the group front waits" in found["type_unusable"]["impact"]
+    _, found = diagnosed(environ, "--config", str(tmp_path / "f.yaml"))
+    unusable = [each for each in found if each["code"] == "type_unusable"]
+    for each, fault, topic in zip(unusable, (why, "the process was ended by signal 6"), ("/b", "/c"), strict=True):
+        assert fault in each["what"]
+        assert f"the relay receives nothing on {topic}, so the group front waits" in each["impact"]
 
 
 @pytest.mark.ros

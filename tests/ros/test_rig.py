@@ -108,6 +108,21 @@ def test_the_sensors_end_with_the_process_that_started_them_and_the_last_removes
     assert left_of(stage.domain, held) == set()
 
 
+_HANGS = (
+    "import time; from rclpy.node import Node; from syncrelay.rig import processes; processes.LEAVE_WITHIN_S = 1; "
+    "Node.destroy_node = lambda self: time.sleep(600)"
+)
+
+
+@pytest.mark.ros
+def test_sensors_that_hang_do_not_outlive_the_process_that_started_them(stage):
+    stage.before_each_sensor(_HANGS)
+    holder = hold(stage)
+    sensors = children_of(holder.pid)
+    holder.send(signal.SIGKILL)
+    wait_until(lambda: not any(map(runs, sensors)), "the end of the rig")
+
+
 _AT_THE_END = """
 import atexit, os, sys, time
 def linger():
