@@ -264,20 +264,11 @@ def _quorum(group: GroupConfig, document: Document) -> Iterator[Problem]:
 
 
 def _tolerances(group: GroupConfig, document: Document) -> Iterator[Problem]:
-    slop, is_of_any = group.options.tolerance, group.options.quorum is not None and not group.required
+    slop = group.options.tolerance
     for (topic, _), own in zip(group.paths(), group.narrowed, strict=True):
-        path = (*topic, "tolerance")
-        if own is None or (*group.path, "quorum") in document.faulty:
-            continue
-        if not is_of_any:
-            text = (
-                "a tolerance is kept only where a set needs no input in particular: write a `quorum` and no `required:"
-                " true`, or leave it out"
-            )
-            yield document.problem(path, text, code="conflict")
-        elif slop is not None and 2 * own.ns >= slop.ns:
+        if own is not None and slop is not None and 2 * own.ns >= slop.ns:
             text = "no less than half the `slop`, so it changes nothing: write less, or a wider slop, or leave it out"
-            yield document.problem(path, text, code="conflict", severity=Severity.WARNING)
+            yield document.problem((*topic, "tolerance"), text, code="conflict", severity=Severity.WARNING)
 
 
 def _unit(group: GroupConfig, document: Document) -> Iterator[Problem]:

@@ -39,7 +39,7 @@ Slop = Field(
 )
 
 
-class NearTopic(PacedTopic):
+class NearTopic(Topic):
     """An input of a policy that can allow for how far each input's stamps may be off."""
 
     tolerance: Annotated[Duration | None, NOT_NULL] = Field(
@@ -47,11 +47,14 @@ class NearTopic(PacedTopic):
         description=(
             "How far stamps of this input may be off, if by less than half the group's `slop`: two messages of a set"
             " are no farther apart than both may be off together. `slop` is needed too: it stays the largest span of a"
-            " set. Only in a group with a `quorum` and no required input. A number is seconds, a string has a unit"
-            " (ns, us, ms, s, min). Default: half the slop."
+            " set. A number is seconds, a string has a unit (ns, us, ms, s, min). Default: half the slop."
         ),
         examples=["5ms"],
     )
+
+
+class PacedNearTopic(PacedTopic, NearTopic):
+    """An input of a policy that waits for better messages."""
 
 
 class SlopGroup(Group):
@@ -63,6 +66,15 @@ class SlopGroup(Group):
     def tolerance(self) -> Tolerance | None:
         """The largest span of a set; None where it may be any."""
         return None if self.slop is None else Tolerance("slop", self.slop)
+
+    def tolerance_of(self, topic: Topic) -> Tolerance | None:
+        """Return the topic's own `tolerance`, else the group's slop."""
+        own = topic.tolerance if isinstance(topic, NearTopic) else None
+        return self.tolerance if own is None else Tolerance("tolerance", own)
+
+    def tolerances_ns(self) -> tuple[int | None, ...]:
+        """Return the topics' own."""
+        return tuple(topic.tolerance if isinstance(topic, NearTopic) else None for topic in self.topics)
 
 
 class ExactTimeGroup(Group):
@@ -103,12 +115,7 @@ class ApproximateTimeGroup(SlopGroup):
         ),
         examples=[0.1],
     )
-    topics: tuple[NearTopic, ...] = Topics
-
-    def tolerance_of(self, topic: Topic) -> Tolerance | None:
-        """Return the topic's own `tolerance`, else the group's slop."""
-        own = topic.tolerance if isinstance(topic, NearTopic) else None
-        return self.tolerance if own is None else Tolerance("tolerance", own)
+    topics: tuple[PacedNearTopic, ...] = Topics
 
     def build_policy(self, _inputs: Inputs) -> ApproximateTime:
         """Return a new policy of the engine."""
@@ -118,7 +125,7 @@ class ApproximateTimeGroup(SlopGroup):
             slop_ns=self.slop,
             age_penalty=self.age_penalty,
             min_periods_ns=tuple(topic.min_period for topic in self.topics),
-            tolerances_ns=tuple(topic.tolerance for topic in self.topics),
+            tolerances_ns=self.tolerances_ns(),
         )
 
 
@@ -130,11 +137,16 @@ class ApproximateTimeEagerGroup(SlopGroup):
     policy: Literal["approximate_time_eager"] = Field(
         description="Sets of near stamps: the tightest that holds the message just arrived, at once."
     )
-    topics: tuple[Topic, ...] = Topics
+    topics: tuple[NearTopic, ...] = Topics
 
     def build_policy(self, _inputs: Inputs) -> ApproximateTimeEager:
         """Return a new policy of the engine."""
-        return ApproximateTimeEager(n_inputs=len(self.topics), queue_size=self.queue_size, slop_ns=self.slop)
+        return ApproximateTimeEager(
+            n_inputs=len(self.topics),
+            queue_size=self.queue_size,
+            slop_ns=self.slop,
+            tolerances_ns=self.tolerances_ns(),
+        )
 
 
 class ApproximateEpsilonTimeGroup(SlopGroup):
@@ -143,11 +155,16 @@ class ApproximateEpsilonTimeGroup(SlopGroup):
     policy: Literal["approximate_epsilon_time"] = Field(
         description="Sets of the oldest messages of all inputs, where these lie within slop; no search for better ones."
     )
-    topics: tuple[Topic, ...] = Topics
+    topics: tuple[NearTopic, ...] = Topics
 
     def build_policy(self, _inputs: Inputs) -> ApproximateEpsilonTime:
         """Return a new policy of the engine."""
-        return ApproximateEpsilonTime(n_inputs=len(self.topics), queue_size=self.queue_size, epsilon_ns=self.slop)
+        return ApproximateEpsilonTime(
+            n_inputs=len(self.topics),
+            queue_size=self.queue_size,
+            epsilon_ns=self.slop,
+            tolerances_ns=self.tolerances_ns(),
+        )
 
 
 class LatestTimeGroup(Group):

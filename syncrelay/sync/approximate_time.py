@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
 from syncrelay.sync.policy import Queued, limit_of, of_required
+from syncrelay.sync.windows import Tolerances, are_narrowed, tolerances_of, windows_of
 
 _STEPS = 8
 """A search strides only after this many single steps. Most searches take fewer, and a stride costs several steps."""
@@ -32,12 +33,14 @@ class ApproximateTime(Queued):
     pivot's message so far; it is always the front of the queues. Messages between it and the heads are skipped. They
     come back when it leaves.
 
-    `tolerances_ns` are for groups where no input is required; there OptionalInputs makes the sets. What is required is
-    matched by slop alone.
+    Where inputs have `tolerances_ns`, sets are those whose windows share a moment. The search is the same, but while
+    the heads' windows share none, the head whose window ends first is passed, as it goes with no later message; and
+    only heads that share one can be a candidate.
     """
 
     __slots__ = (
         "_age_penalty",
+        "_are_narrowed",
         "_candidate_end",
         "_candidate_start",
         "_cursors",
@@ -55,6 +58,7 @@ class ApproximateTime(Queued):
         "_slop",
         "_stamps",
         "_tolerances",
+        "_windows",
         "n_inputs",
         "waits_ended",
         "waits_started",
@@ -68,7 +72,7 @@ class ApproximateTime(Queued):
         slop_ns: int | None,
         age_penalty: float = 0.1,
         min_periods_ns: Sequence[int] | None = None,
-        tolerances_ns: Sequence[int | None] | None = None,
+        tolerances_ns: Tolerances = None,
     ) -> None:
         periods = (0,) * n_inputs if min_periods_ns is None else tuple(min_periods_ns)
         self.make_queues(n_inputs, queue_size)
@@ -77,10 +81,9 @@ class ApproximateTime(Queued):
             raise ValueError(f"age_penalty {age_penalty} must be 0 or more")
         if len(periods) != n_inputs or any(period < 0 for period in periods):
             raise ValueError(f"min_periods_ns {periods} must be {n_inputs} numbers, 0 or more")
-        tolerances = (None,) * n_inputs if tolerances_ns is None else tuple(tolerances_ns)
-        if len(tolerances) != n_inputs or any(each is not None and each < 0 for each in tolerances):
-            raise ValueError(f"tolerances_ns {tolerances} must be {n_inputs} numbers, 0 or more, or None")
-        self._tolerances = tolerances
+        self._tolerances = tolerances_ns
+        self._windows = windows_of(self._slop, tolerances_ns, n_inputs)
+        self._are_narrowed = are_narrowed(self._windows, self._slop)
         self._age_penalty = age_penalty
         self._scale = (1.0 + age_penalty).as_integer_ratio()
         self._min_periods = periods
@@ -99,6 +102,7 @@ class ApproximateTime(Queued):
             slop_ns=self._slop,
             age_penalty=self._age_penalty,
             min_periods_ns=of_required(self._min_periods, required),
+            tolerances_ns=tolerances_of(self._tolerances, required),
         )
         stage = OptionalInputs(
             required=required,
@@ -187,23 +191,21 @@ class ApproximateTime(Queued):
         steps = 0
         while len(self._heads) == self.n_inputs:
             steps += 1
-            if steps > _STEPS:
+            if steps > _STEPS and not self._are_narrowed:
                 self._stride(outcomes)
             heads = self._heads
-            start, first = heads[0]
+            apart = self._apart() if self._are_narrowed else None
+            start, _ = heads[0]
+            _, first = heads[apart or 0]
             end, latest = heads[-1]
             if overflowed:
                 self._excuse_all_but(latest)
             if self._pivot is None:
-                if end - start > self._slop or overflowed:
-                    self._drop_heads(outcomes)
+                if end - start > self._slop or overflowed or apart is not None:
+                    self._drop_heads(outcomes, apart)
                     continue
-                self._pivot = latest
-                self._pivot_stamp = end
-                if self.waits_started == self.waits_ended:
-                    self.waits_started += 1
-                self._take_candidate(start, end)
-            else:
+                self._take_first_candidate(start, end, latest)
+            elif apart is None:
                 later_end = end - self._candidate_end
                 later_start = start - self._candidate_start
                 # The penalty only lengthens, so the first comparison avoids most of the products.
@@ -212,7 +214,7 @@ class ApproximateTime(Queued):
                     self._take_candidate(start, end)
             stamps = self._stamps[first]
             cursor = self._cursors[first] = self._cursors[first] + 1
-            del heads[0]
+            del heads[apart or 0]
             awaited = cursor == len(stamps)
             if not awaited:
                 insort(heads, (stamps[cursor], first))
@@ -220,18 +222,26 @@ class ApproximateTime(Queued):
                 self._emit(outcomes)
         return outcomes
 
-    def _drop_heads(self, outcomes: list[Outcome]) -> None:
+    def _apart(self) -> int | None:
+        """Return which head's window ends first, if that is before another's begins."""
+        windows = self._windows
+        close, apart = min(
+            (head + windows[place].after, position) for position, (head, place) in enumerate(self._heads)
+        )
+        return apart if close < max(head - windows[place].before for head, place in self._heads) else None
+
+    def _drop_heads(self, outcomes: list[Outcome], apart: int | None) -> None:
         """Drop the earliest head, and the messages behind it that would be dropped next because they are too far.
 
-        After an overflow, the earliest head is dropped even if it is near enough.
+        Where a head is `apart`, drop that. After an overflow, the earliest is dropped even if it is near enough.
         """
-        _, place = self._heads[0]
+        _, place = self._heads[apart or 0]
         next_head, _ = self._heads[1]
         end, _ = self._heads[-1]
         stamps = self._stamps[place]
-        count = bisect_left(stamps, min(next_head, end - self._slop)) or 1
+        count = 1 if self._are_narrowed else bisect_left(stamps, min(next_head, end - self._slop)) or 1
         if len(stamps) == count:
-            self._note_missed(stamps[-1])
+            self._note_missed(place, stamps[-1])
         self._drop_oldest(place, count, DropReason.TOO_FAR, outcomes)
 
     def _stride(self, outcomes: list[Outcome]) -> None:
@@ -276,11 +286,13 @@ class ApproximateTime(Queued):
         """Forget the overflow of inputs that do not have the latest head. They may be the pivot again."""
         self._overflowed.intersection_update((latest,))
 
-    def _note_missed(self, start: int) -> None:
+    def _note_missed(self, place: int, start: int) -> None:
         """Note whether messages that would have matched the only message of an input had overflowed."""
-        for head, place in self._heads:
+        before, after = self._windows[place]
+        for head, other in self._heads:
             if head > start:
-                self._losses.miss(place, self._stamps[place], start, before=self._slop, after=self._slop)
+                window, stamps = self._windows[other], self._stamps[other]
+                self._losses.miss(other, stamps, start, before=before + window.after, after=after + window.before)
 
     def _drop_oldest(self, place: int, count: int, reason: DropReason, outcomes: list[Outcome]) -> None:
         """Drop heads while there is no candidate."""
@@ -289,6 +301,13 @@ class ApproximateTime(Queued):
         outcomes += self._queues[place].drop(count, reason)
         if stamps:
             insort(self._heads, (stamps[0], place))
+
+    def _take_first_candidate(self, start: int, end: int, latest: int) -> None:
+        self._pivot = latest
+        self._pivot_stamp = end
+        if self.waits_started == self.waits_ended:
+            self.waits_started += 1
+        self._take_candidate(start, end)
 
     def _take_candidate(self, start: int, end: int) -> None:
         numerator, denominator = self._scale

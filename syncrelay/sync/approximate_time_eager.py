@@ -6,16 +6,17 @@ from collections.abc import Sequence
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
 from syncrelay.sync.policy import Queued, limit_of
+from syncrelay.sync.windows import Tolerances, Window, are_narrowed, tolerances_of, windows_of
 
 
 class ApproximateTimeEager(Queued):
     """The tightest set within slop that has the message that has just arrived leaves at once.
 
     Of sets of the same span, the one that starts first leaves, in which each input has its latest message that is not
-    newer than the arrived one. Messages older than a set that leaves are superseded, so sets never go back. A message
-    that is more than slop older than all messages of another input is too far. This is for users of Python's
-    ApproximateTimeSynchronizer, whose slop is exclusive, which takes the first set that fits, and whose cost is a
-    product of queues.
+    newer than the arrived one; where inputs have `tolerances_ns`, its oldest that may be in that set. Messages older
+    than a set that leaves are superseded, so sets never go back. A message that is too old for all messages of another
+    input is too far. This is for users of Python's ApproximateTimeSynchronizer, whose slop is exclusive, which takes
+    the first set that fits, and whose cost is a product of queues.
 
         lidar  |a..b..cd
         camera |..A....D
@@ -25,17 +26,40 @@ class ApproximateTimeEager(Queued):
     Slop is 2. aA does not wait for b, which is nearer to A and comes a little later.
     """
 
-    __slots__ = ("_losses", "_queue_size", "_queues", "_slop", "_stamps", "n_inputs")
+    __slots__ = (
+        "_are_narrowed",
+        "_losses",
+        "_queue_size",
+        "_queues",
+        "_slop",
+        "_stamps",
+        "_tolerances",
+        "_windows",
+        "n_inputs",
+    )
 
-    def __init__(self, *, n_inputs: int, queue_size: int, slop_ns: int | None) -> None:
+    def __init__(
+        self, *, n_inputs: int, queue_size: int, slop_ns: int | None, tolerances_ns: Tolerances = None
+    ) -> None:
         self.make_queues(n_inputs, queue_size)
         self._slop = limit_of(slop_ns)
+        self._tolerances = tolerances_ns
+        self._windows = windows_of(self._slop, tolerances_ns, n_inputs)
+        self._are_narrowed = are_narrowed(self._windows, self._slop)
         self._stamps = [queue.stamps for queue in self._queues]
 
     def for_required(self, required: Sequence[bool], quorum: int) -> tuple["ApproximateTimeEager", OptionalInputs]:
-        size, slop = self._queue_size, self._slop
-        stage = OptionalInputs(required=required, quorum=quorum, queue_size=size, slop_ns=slop)
-        return ApproximateTimeEager(n_inputs=sum(required), queue_size=size, slop_ns=slop), stage
+        size, slop, tolerances = self._queue_size, self._slop, self._tolerances
+        policy = ApproximateTimeEager(
+            n_inputs=sum(required),
+            queue_size=size,
+            slop_ns=slop,
+            tolerances_ns=tolerances_of(tolerances, required),
+        )
+        stage = OptionalInputs(
+            required=required, quorum=quorum, queue_size=size, slop_ns=slop, tolerances_ns=tolerances
+        )
+        return policy, stage
 
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
         queue, stamps = self._queues[place], self._stamps[place]
@@ -44,14 +68,14 @@ class ApproximateTimeEager(Queued):
             stamps.append(stamp)
             queue.messages.append(message)
             if len(stamps) == 1:
-                self._begin(stamp, outcomes)
+                self._begin(place, stamp, outcomes)
         elif (replaced := queue.insert(stamp, message)) is not None:
             outcomes.append(Drop(replaced, DropReason.DUPLICATE))
         elif stamps[0] == stamp:
             self._drop_too_far(outcomes)
         if all(self._stamps):
             # There was no set before, so this is the only message of its input. The first messages of all inputs are
-            # within slop of the latest of them, so there is a set now.
+            # near enough to each other, so there is a set now.
             self._match(stamp, outcomes)
         if len(stamps) > self._queue_size:
             self._losses.lose(place, stamps[0])
@@ -59,19 +83,24 @@ class ApproximateTimeEager(Queued):
             self._drop_too_far(outcomes)
         return outcomes
 
-    def _begin(self, stamp: int, outcomes: list[Outcome]) -> None:
+    def _begin(self, place: int, stamp: int, outcomes: list[Outcome]) -> None:
         """Note which overflowed messages the only message of its input has missed, and drop what is too far."""
-        for place, stamps in enumerate(self._stamps):
-            if stamps and stamps[0] > stamp + self._slop:
-                self._losses.miss(place, stamps, stamp, before=self._slop, after=self._slop)
+        before, after = self._windows[place]
+        for other, (stamps, window) in enumerate(zip(self._stamps, self._windows, strict=True)):
+            if stamps and stamps[0] > stamp + after + window.before:
+                self._losses.miss(other, stamps, stamp, before=before + window.after, after=after + window.before)
         self._drop_too_far(outcomes)
 
     def _drop_too_far(self, outcomes: list[Outcome]) -> None:
-        """Drop messages that are not within slop of any message that another input has or will send."""
-        while (firsts := [stamps[0] for stamps in self._stamps if stamps]) and min(firsts) < max(firsts) - self._slop:
-            near = max(firsts) - self._slop
-            for queue in self._queues:
-                outcomes += queue.drop(bisect_left(queue.stamps, near), DropReason.TOO_FAR)
+        """Drop messages that go with no message that another input has or will send."""
+        while True:
+            firsts = [(stamps[0], window) for stamps, window in zip(self._stamps, self._windows, strict=True) if stamps]
+            close = min([first + window.after for first, window in firsts], default=0)
+            begin = max([first - window.before for first, window in firsts], default=0)
+            if close >= begin:
+                return
+            for queue, window in zip(self._queues, self._windows, strict=True):
+                outcomes += queue.drop(bisect_left(queue.stamps, begin - window.after), DropReason.TOO_FAR)
 
     def _match(self, stamp: int, outcomes: list[Outcome]) -> None:
         if max(map(len, self._stamps)) == 1:
@@ -81,7 +110,8 @@ class ApproximateTimeEager(Queued):
                 stamps.clear()
             return
         members = []
-        for queue, wanted in zip(self._queues, _tightest(stamp, self._stamps), strict=True):
+        best = _in_windows(self._stamps, self._windows) if self._are_narrowed else _tightest(stamp, self._stamps)
+        for queue, wanted in zip(self._queues, best, strict=True):
             if queue.stamps[0] != wanted:
                 outcomes += queue.drop(bisect_left(queue.stamps, wanted), DropReason.SUPERSEDED)
             members.append(queue.remove(0))
@@ -105,3 +135,25 @@ def _tightest(stamp: int, queues: Sequence[Sequence[int]]) -> list[int]:
         if max(candidate) - min(candidate) < max(best) - min(best):
             best = candidate.copy()
     return best
+
+
+def _in_windows(queues: Sequence[Sequence[int]], windows: Sequence[Window]) -> list[int]:
+    """Return the stamps of the tightest set whose windows share a moment; of equal spans the first, of its oldest.
+
+    The first stamps are one, and the arrived message is the only one of its input. While the windows share a moment,
+    the earliest stamp is replaced by the next of its input; while they do not, the one whose window ends first, as it
+    goes with no later one.
+    """
+    heads, rests = [stamps[0] for stamps in queues], [iter(stamps[1:]) for stamps in queues]
+    best = heads.copy()
+    while True:
+        closes = [head + window.after for head, window in zip(heads, windows, strict=True)]
+        place = closes.index(min(closes))
+        if closes[place] >= max(head - window.before for head, window in zip(heads, windows, strict=True)):
+            if max(heads) - min(heads) < max(best) - min(best):
+                best = heads.copy()
+            place = heads.index(min(heads))
+        following = next(rests[place], None)
+        if following is None:
+            return best
+        heads[place] = following

@@ -154,14 +154,14 @@ class Limited:
         return joined
 
     def _widened(self, match: Match, since: int) -> Waiting:
-        """Return a set with a place for every input, and the least and the greatest stamp that it was matched by."""
+        """Return a set with a place for every input, and the stamps that it was matched by."""
         messages: list[Message | None] = [None] * len(self._offsets)
-        stamps = []
+        stamps = {}
         for message in match.messages:
             if message is not None:
                 messages[message.input] = message
-                stamps.append(message.stamp + self._offsets[message.input])
-        return Waiting(tuple(messages), min(stamps), max(stamps), since)
+                stamps[message.input] = message.stamp + self._offsets[message.input]
+        return Waiting(tuple(messages), stamps, min(stamps.values()), max(stamps.values()), since)
 
     def _note_waits(self, now: int) -> int:
         """Note which waits began and ended. Return when the first one that ended had begun, `now` if none ended."""

@@ -8,19 +8,9 @@ from typing import Final, NamedTuple
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.queues import StampQueue
 from syncrelay.sync.waiting import OptionalStage, Seed, Waiting
+from syncrelay.sync.windows import Tolerances, windows_of
 
 _EARLIEST: Final = -(2**63)
-
-
-class _Window(NamedTuple):
-    """How far before and after a stamp the moment of its message may be."""
-
-    before: int
-    after: int
-
-    def around(self, low: int, high: int) -> tuple[int, int]:
-        """Return the first and the last moment that messages from `low` to `high` share."""
-        return high - self.before, low + self.after
 
 
 class _Last(NamedTuple):
@@ -32,7 +22,7 @@ class _Last(NamedTuple):
 
 
 class OptionalInputs(OptionalStage):
-    """Adds to each set, for each optional input, the message nearest to the middle of the set, within slop.
+    """Adds to each set, for each optional input, the message nearest to the middle of the set that may be in it.
 
     It is decided when no later message of any optional input can be nearer. A message goes to the nearer of two sets
     that wait. It is superseded when a newer one of its input went into a set, and too far when it is too old for every
@@ -42,10 +32,6 @@ class OptionalInputs(OptionalStage):
     the first of them in their order. So sets are made round the messages of the first input while these come. A message
     that is not newer than the one that the last set was made round is late, and those that the last set left without
     make none of their own.
-
-    There, an input may have one of `tolerances_ns`. The windows of a set's messages share a moment: a window reaches
-    from a stamp as far as the tolerance, but no farther than half of slop, as it does where there is none. So without
-    tolerances, the span of a set is at most slop; with them, two messages are at most both tolerances apart.
     """
 
     def __init__(
@@ -56,23 +42,15 @@ class OptionalInputs(OptionalStage):
         queue_size: int,
         slop_ns: int,
         min_periods_ns: Sequence[int] | None = None,
-        tolerances_ns: Sequence[int | None] | None = None,
+        tolerances_ns: Tolerances = None,
     ) -> None:
-        if any(required) and any(tolerance is not None for tolerance in tolerances_ns or ()):
-            raise ValueError(f"tolerances_ns {tolerances_ns} must be None where an input is required: {required}")
         self.inputs = [index for index, needed in enumerate(required) if not needed]
         self.lacking = quorum - sum(required)
         self.queue_size = queue_size
         self.waiting = deque()
         self.came = {index: {} for index in self.inputs}
         self._queues = {index: StampQueue() for index in self.inputs}
-        self._slop = slop_ns
-        # Of an odd slop, the nanosecond that is left counts after the stamp.
-        self._half = _Window(slop_ns // 2, slop_ns - slop_ns // 2)
-        self._windows = [
-            self._half if tolerance is None else _Window(*(min(tolerance, reach) for reach in self._half))
-            for tolerance in tolerances_ns or (None,) * len(required)
-        ]
+        self._windows = windows_of(slop_ns, tolerances_ns, len(required))
         self._least_steps = [max(1, period) for period in min_periods_ns or (1,) * len(required)]
         self._newest: dict[int, int] = {}
         self._is_any = not any(required)
@@ -110,18 +88,17 @@ class OptionalInputs(OptionalStage):
             position = self._nearest(seed, index, begin, close)
             if position is not None:
                 stamp = chosen[index] = queue.stamps[position]
-                first, last = self._windows[index].around(stamp, stamp)
+                first, last = self._windows[index].around(stamp)
                 begin, close = max(begin, first), min(close, last)
         return chosen
 
     def complete(self, seed: Seed) -> list[Outcome]:
         waiting, _ = seed
         messages, chosen = list(waiting.messages), self.chosen(seed)
-        useless = waiting.high - self._slop
+        begin, _ = self._shared(waiting)
         if self._is_any:
-            useless = waiting.low
             close = min(stamp + self._windows[index].after for index, stamp in chosen.items())
-            self._last = _Last(useless, close, frozenset(chosen))
+            self._last = _Last(waiting.low, close, frozenset(chosen))
         drops: list[Drop] = []
         for index, queue in self._queues.items():
             if index in chosen:
@@ -129,6 +106,7 @@ class OptionalInputs(OptionalStage):
                 del self.came[index][chosen[index]]
                 messages[index] = queue.remove(0)
             else:
+                useless = waiting.low if self._is_any else begin - self._windows[index].after
                 drops += self._drop(index, bisect_right(queue.stamps, useless), DropReason.TOO_FAR)
         if self.waiting:
             self.waiting.popleft()
@@ -160,8 +138,10 @@ class OptionalInputs(OptionalStage):
 
     def _shared(self, waiting: Waiting) -> tuple[int, int]:
         """Return the first and the last moment that what a set is made round shares."""
-        window = self._half if waiting.leader is None else self._windows[waiting.leader]
-        return window.around(waiting.low, waiting.high)
+        firsts, lasts = zip(
+            *[self._windows[index].around(stamp) for index, stamp in waiting.stamps.items()], strict=True
+        )
+        return max(firsts), min(lasts)
 
     def _nearest(self, seed: Seed, index: int, begin: int, close: int) -> int | None:
         """Return the place of an input's stamp nearest to the set's middle, of those whose window meets the set's.
@@ -195,7 +175,10 @@ class OptionalInputs(OptionalStage):
             heads = {index: stamps[index][place] for index, place in places.items() if place < len(stamps[index])}
             if len(heads) < self.lacking:
                 return
-            windows = {index: self._windows[index].around(head, head) for index, head in heads.items()}
+            reaches = {index: self._windows[index] for index in heads}
+            windows = {
+                index: (head - reaches[index].before, head + reaches[index].after) for index, head in heads.items()
+            }
             begin = sorted(first for first, _ in windows.values())[self.lacking - 1]
             close = min(last for _, last in windows.values())
             if close < begin:
@@ -214,7 +197,7 @@ class OptionalInputs(OptionalStage):
             places[leader] = place + 1
 
     def _around(self, stamp: int, leader: int) -> Waiting:
-        return Waiting(self._nothing, stamp, stamp, _EARLIEST, leader)
+        return Waiting(self._nothing, {leader: stamp}, stamp, stamp, _EARLIEST)
 
     def _is_new(self, seed: Seed) -> bool:
         """Whether a set is of another moment than the last, and not of those that were missing there."""

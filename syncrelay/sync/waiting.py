@@ -9,17 +9,17 @@ from syncrelay.sync.messages import Drop, DropReason, Message, Outcome
 
 
 class Waiting(NamedTuple):
-    """What a set is made round: its messages, their least and greatest stamp, when its wait began.
+    """What a set is made round: its messages, their stamps, the least and the greatest of these, when its wait began.
 
     The messages are those of the required inputs, None for the others. Where no input is required there are none yet,
-    and both stamps are that of the message which the set is made round, of the input `leader`.
+    and the one stamp is that of the message which the set is made round.
     """
 
     messages: tuple[Message | None, ...]
+    stamps: Mapping[int, int]
     low: int
     high: int
     since: int
-    leader: int | None = None
 
 
 Seed: TypeAlias = tuple[Waiting, Waiting | None]

@@ -112,8 +112,9 @@ def test_one_that_its_tolerance_keeps_out_is_told_so_and_no_slop_is_offered():
     assert finding.suggestion == "check how these topics are stamped, or write a wider `tolerance`"
 
 
-def test_where_tolerances_let_no_set_leave_they_are_named_and_no_slop_is_offered():
-    told = run(*lidars_of((0, 8, 16), ("2ms", "3ms", "2ms")), seconds=40, options=OPTIONS)
+@pytest.mark.parametrize("options", [OPTIONS, {"slop": "20ms"}], ids=["two of three", "all required"])
+def test_where_tolerances_let_no_set_leave_they_are_named_and_no_slop_is_offered(options):
+    told = run(*lidars_of((0, 8, 16), ("2ms", "3ms", "2ms")), seconds=40, options=options)
     assert told.codes == {"over_slop"}
     finding = next(each for each in told.found[-1][1] if each.code.value == "over_slop")
     assert re.fullmatch(

@@ -18,6 +18,7 @@ from tests.sync.support.rigs import EXPORTED
 
 SIZES: list[dict[str, Any]] = [{"n_inputs": -1}, {"queue_size": 0}]
 OF_LATEST: list[dict[str, Any]] = [{"required": (True,)}, {"max_ages_ns": (None, -1)}, {"max_ages_ns": (None,)}]
+TOLERANCES: list[dict[str, Any]] = [{"tolerances_ns": tolerances} for tolerances in ((None,), (None, -1))]
 RIGHT: dict[Any, dict[str, Any]] = {
     ExactTime: {},
     ApproximateTime: {"slop_ns": 1},
@@ -32,10 +33,10 @@ WRONG: dict[Any, list[dict[str, Any]]] = {
         {"slop_ns": -1},
         *({"age_penalty": age_penalty} for age_penalty in (-0.1, float("inf"), float("nan"))),
         *({"min_periods_ns": periods} for periods in ((0,), (0, -1))),
-        *({"tolerances_ns": tolerances} for tolerances in ((None,), (None, -1))),
+        *TOLERANCES,
     ],
-    ApproximateTimeEager: [{"slop_ns": -1}],
-    ApproximateEpsilonTime: [{"epsilon_ns": -1}],
+    ApproximateTimeEager: [{"slop_ns": -1}, *TOLERANCES],
+    ApproximateEpsilonTime: [{"epsilon_ns": -1}, *TOLERANCES],
     LatestTime: [{"trigger": -1}, {"trigger": 2}, {"required": (False, True)}, *OF_LATEST],
     LatestAtTicks: [{"required": (False, False)}, *OF_LATEST],
 }

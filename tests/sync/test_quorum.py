@@ -104,9 +104,10 @@ def test_one_joins_only_what_it_goes_with_all_of():
     assert turns_of(played(lidars(tolerances=[2 * MS, 8 * MS, None]), sent)) == [(0, 0, None)]
 
 
-def test_required_inputs_are_not_matched_by_tolerances():
-    with pytest.raises(ValueError, match="must be None where an input is required"):
-        lidars(required=[0], tolerances=[None, MS, None])
+def test_a_tolerance_of_half_of_slop_or_more_changes_nothing():
+    sent = [Scan(0, 0, START, START), Scan(1, 0, START + SLOP, START + SLOP), Scan(2, 0, START - 1, START + SLOP)]
+    for wide in (SLOP // 2, SLOP, PERIOD):
+        assert turns_of(played(lidars(tolerances=[wide] * 3), sent)) == turns_of(played(lidars(), sent))
 
 
 def drawn_world(rng):

@@ -23,7 +23,7 @@ def drawn(rng, policy):
         required[rng.randrange(n_inputs)] = True
     quorum = rng.randint(max(1, sum(required)), n_inputs)
     quorum = rng.choice((quorum, sum(required) or quorum))
-    has_tolerances = not any(required) and policy == "approximate_time" and rng.random() < 0.8
+    has_tolerances = policy.startswith("approximate") and rng.random() < (0.4 if any(required) else 0.8)
     may_wait_forever = all(required) or policy in ("latest_time", *BY_CLOCK)
     return Options(
         required=tuple(required),

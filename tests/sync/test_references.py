@@ -29,8 +29,13 @@ from tests.sync.support.streams import AGE_PENALTIES, MS, disordered, gappy
 _STREAMS = chosen(short=100, long=3_000)
 
 
+def tolerances(rng, sizes):
+    return rng.choice((None, [rng.choice((None, 0, 2 * MS, 9 * MS, 40 * MS)) for _ in range(sizes["n_inputs"])]))
+
+
 def approximate_time(rng, sizes):
     options = {
+        "tolerances_ns": tolerances(rng, sizes),
         "slop_ns": rng.choice((0, 5 * MS, 50 * MS, 500 * MS, None)),
         "age_penalty": rng.choice((*AGE_PENALTIES, 0.7)),
         "min_periods_ns": [rng.choice((0, 0, 8 * MS, 60 * MS)) for _ in range(sizes["n_inputs"])],
@@ -43,13 +48,13 @@ def exact_time(_, sizes):
 
 
 def approximate_time_eager(rng, sizes):
-    slop = rng.choice((0, 5 * MS, 30 * MS, 100 * MS, None))
-    return ApproximateTimeEager(**sizes, slop_ns=slop), ReferenceEager(**sizes, slop_ns=slop)
+    options = {"slop_ns": rng.choice((0, 5 * MS, 30 * MS, 100 * MS, None)), "tolerances_ns": tolerances(rng, sizes)}
+    return ApproximateTimeEager(**sizes, **options), ReferenceEager(**sizes, **options)
 
 
 def approximate_epsilon_time(rng, sizes):
-    epsilon = rng.choice((0, 5 * MS, 50 * MS, 500 * MS, None))
-    return ApproximateEpsilonTime(**sizes, epsilon_ns=epsilon), ReferenceEpsilon(**sizes, epsilon_ns=epsilon)
+    options = {"epsilon_ns": rng.choice((0, 5 * MS, 50 * MS, 500 * MS, None)), "tolerances_ns": tolerances(rng, sizes)}
+    return ApproximateEpsilonTime(**sizes, **options), ReferenceEpsilon(**sizes, **options)
 
 
 def latest_time(rng, sizes):

@@ -4,13 +4,14 @@ from bisect import insort
 from fractions import Fraction
 
 from syncrelay.sync import Drop, DropReason, Match, Message, Outcome
+from tests.sync.support.references import Rooms
 
 
 class ReferenceApproximateTime:
-    def __init__(self, *, n_inputs, queue_size, slop_ns, age_penalty=0.1, min_periods_ns=None):
+    def __init__(self, *, n_inputs, queue_size, slop_ns, age_penalty=0.1, min_periods_ns=None, tolerances_ns=None):
         self.inputs = range(n_inputs)
         self.queue_size = queue_size
-        self.slop = float("inf") if slop_ns is None else slop_ns
+        self.rooms = Rooms(slop_ns, tolerances_ns, n_inputs)
         self.factor = Fraction(1.0 + age_penalty)
         self.bounds = min_periods_ns or [0] * n_inputs
         self.queues: list[list[Message]] = [[] for _ in self.inputs]
@@ -56,16 +57,18 @@ class ReferenceApproximateTime:
     def search(self):
         while None not in (heads := [self.head(index) for index in self.inputs]):
             start, end = min(heads), max(heads)
-            first = heads.index(start)
+            messages = [queue[cursor] for queue, cursor in zip(self.queues, self.cursors, strict=True)]
+            goes = self.rooms.have(messages)
+            first = heads.index(start) if goes else min(messages, key=self.rooms.twice_last).input
             last = max(index for index in self.inputs if heads[index] == end)
             self.overflowed = [lost and index == last for index, lost in enumerate(self.overflowed)]
             if self.pivot is None:
-                if end - start > self.slop or self.overflowed[last]:
+                if not goes or self.overflowed[last]:
                     self.left.append(Drop(self.queues[first].pop(0), DropReason.TOO_FAR))
                     continue
                 self.pivot, self.pivot_stamp = last, end
                 self.start, self.end = start, end
-            elif self.scale(end - self.end) < start - self.start:
+            elif goes and self.scale(end - self.end) < start - self.start:
                 self.drop_skipped()
                 self.start, self.end = start, end
             self.cursors[first] += 1

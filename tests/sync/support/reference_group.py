@@ -417,8 +417,14 @@ class ByStamp(Stage):
         return min(fitting, key=lambda each: (abs(2 * each[0] - self.middle(seed)), each[0]), default=None)
 
     def useless(self, index, seed, best):
-        last = max(seed["stamps"]) - (0 if self.is_any else self.slop) + 1 if best is None else best[0]
-        return [each for each in self.in_order(self.of(index)) if each[0] < last]
+        if best is not None or self.is_any:
+            last = best[0] if best is not None else seed["stamps"][0] + 1
+            return [each for each in self.in_order(self.of(index)) if each[0] < last]
+        return [
+            each
+            for each in self.in_order(self.of(index))
+            if any(self.room(other, (each[0], index)) <= 0 for other in seed["there"])
+        ]
 
     def is_decided(self, index, seed):
         """Whether a message of the least stamp that may come is farther from the middle than the best, or too far."""

@@ -1,6 +1,6 @@
 """Each policy slow and obvious: plain lists, no bookkeeping. What is fed must leave as from the engine."""
 
-from itertools import product
+from itertools import combinations, product
 from operator import ge
 from types import SimpleNamespace
 
@@ -83,10 +83,36 @@ class ReferenceExactTime(Queued):
             self.drop(queued, reason)
 
 
-class ReferenceEager(Queued):
-    def __init__(self, n_inputs, queue_size, slop_ns):
-        super().__init__(n_inputs, queue_size)
+class Rooms:
+    """How far apart messages of two inputs may be: as far as both may be off, half of slop at most."""
+
+    def __init__(self, slop_ns, tolerances_ns, n_inputs):
         self.slop = float("inf") if slop_ns is None else slop_ns
+        self.tolerances = tolerances_ns or [None] * n_inputs
+
+    def has(self, one, other):
+        """Whether two messages may be in one set."""
+        return one.input == other.input or 2 * abs(one.stamp - other.stamp) <= self.twice_off(one) + self.twice_off(
+            other
+        )
+
+    def twice_off(self, message):
+        tolerance = self.tolerances[message.input]
+        return self.slop if tolerance is None else min(2 * tolerance, self.slop)
+
+    def twice_last(self, message):
+        """Twice the last moment that it may be of, and its stamp, as the first may be off without end."""
+        return 2 * message.stamp + self.twice_off(message), message.stamp
+
+    def have(self, members):
+        return all(self.has(one, other) for one, other in combinations(members, 2))
+
+
+class ReferenceEager(Queued):
+    def __init__(self, n_inputs, queue_size, slop_ns, tolerances_ns=None):
+        super().__init__(n_inputs, queue_size)
+        self.rooms = Rooms(slop_ns, tolerances_ns, n_inputs)
+        self.is_narrowed = any(each is not None and 2 * each < self.rooms.slop for each in self.rooms.tolerances)
 
     def take(self, message):
         if self.replace(message):
@@ -95,10 +121,12 @@ class ReferenceEager(Queued):
         fits = [
             members
             for members in product(*(self.of(index) for index in range(self.n_inputs)))
-            if message in members and span(members) <= self.slop
+            if message in members and self.rooms.have(members)
         ]
 
         def near(members):
+            if self.is_narrowed:
+                return list(map(by_stamp, members))
             return [(member.stamp > message.stamp, abs(member.stamp - message.stamp)) for member in members]
 
         if fits:
@@ -111,7 +139,9 @@ class ReferenceEager(Queued):
 
     def drop_too_far(self):
         while far := [
-            queued for queued in self.queued if any(head.stamp > queued.stamp + self.slop for head in self.heads())
+            queued
+            for queued in self.queued
+            if any(head.stamp > queued.stamp and not self.rooms.has(head, queued) for head in self.heads())
         ]:
             self.drop(far[0], DropReason.TOO_FAR)
 
@@ -122,16 +152,16 @@ def span(members):
 
 
 class ReferenceEpsilon(Queued):
-    def __init__(self, n_inputs, queue_size, epsilon_ns):
+    def __init__(self, n_inputs, queue_size, epsilon_ns, tolerances_ns=None):
         super().__init__(n_inputs, queue_size)
-        self.epsilon = float("inf") if epsilon_ns is None else epsilon_ns
+        self.rooms = Rooms(epsilon_ns, tolerances_ns, n_inputs)
 
     def take(self, message):
         if self.replace(message):
             return
         while len(self.heads()) == self.n_inputs:
-            last = min(head.stamp for head in self.heads()) + self.epsilon
-            near = [head for head in self.heads() if head.stamp <= last]
+            first = min(self.heads(), key=self.rooms.twice_last)
+            near = [head for head in self.heads() if head.stamp <= first.stamp or self.rooms.has(head, first)]
             if len(near) == self.n_inputs:
                 self.match(near)
             else:
