@@ -11,7 +11,7 @@ from syncrelay.printable import printable
 
 _ANY_TYPE: Final = "type from the graph"
 # The keys of a group that have no line of their own: they are shown by what is drawn.
-_SHOWN_OTHERWISE: Final = ("policy", "topics", "output_prefix", "manifest", "trigger")
+_SHOWN_OTHERWISE: Final = ("policy", "topics", "output_prefix", "outputs", "bundle", "manifest", "trigger")
 # All other characters have a meaning somewhere in Mermaid's grammar, or in HTML.
 _NOT_PLAIN: Final = re.compile(r"[^A-Za-z0-9 _./,:~+-]")
 
@@ -36,11 +36,11 @@ class Path:
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """All groups with their paths. An input of several groups has one box."""
+    """All groups with their paths and the box of their bundle. An input of several groups has one box."""
 
     title: str
     inputs: tuple[Box, ...]
-    groups: tuple[tuple[Box, tuple[Path, ...]], ...]
+    groups: tuple[tuple[Box, tuple[Path, ...], Box | None], ...]
 
 
 def drawing_of(config: Config, *, title: str) -> Drawing:
@@ -54,7 +54,10 @@ def drawing_of(config: Config, *, title: str) -> Drawing:
             label = ", ".join(_said_of_topic(group, index, config))
             output = config.node.absolute(topic.output)
             paths.append(Path(list(inputs).index(name), label, not topic.required, output))
-        groups.append((_group_box(group, config), tuple(paths)))
+        bundle = None
+        if group.bundle is not None:
+            bundle = Box(config.node.absolute(group.bundle.topic), (group.bundle.type,))
+        groups.append((_group_box(group, config), tuple(paths), bundle))
     return Drawing(printable(title), tuple(inputs.values()), tuple(groups))
 
 
@@ -82,12 +85,13 @@ def as_mermaid(drawing: Drawing) -> Iterator[str]:
     yield from ("---", f'title: "{_NOT_PLAIN.sub("?", drawing.title)}"', "---", "flowchart LR")
     for index, each in enumerate(drawing.inputs):
         yield f'  i{index}["{_label(each)}"]'
-    for at, (box, paths) in enumerate(drawing.groups):
+    for at, (box, paths, bundle) in enumerate(drawing.groups):
         yield f'  g{at}("{_label(box)}")'
         for path in paths:
             label = f'|"{_escaped(path.label)}"|' if path.label else ""
             yield f"  i{path.input} {'-.->' if path.is_optional else '-->'}{label} g{at}"
-        yield from (f'  g{at} --> o{at}_{index}["{_escaped(path.output)}"]' for index, path in enumerate(paths))
+        outputs = {path.output: Box(path.output, ()) for path in paths} | ({bundle.name: bundle} if bundle else {})
+        yield from (f'  g{at} --> o{at}_{index}["{_label(each)}"]' for index, each in enumerate(outputs.values()))
 
 
 def _label(box: Box) -> str:
@@ -101,12 +105,14 @@ def _escaped(text: str) -> str:
 def as_text(drawing: Drawing) -> Iterator[str]:
     """Yield lines for a terminal: each group, then a line for each input with its output."""
     yield drawing.title
-    for box, paths in drawing.groups:
+    for box, paths, bundle in drawing.groups:
         yield ""
         yield f"{box.name}: {', '.join(box.lines)}"
-        inputs = [_described(drawing.inputs[path.input], path.label) for path in paths]
-        width = max(map(len, inputs))
-        yield from (f"  {each:<{width}} -> {path.output}" for each, path in zip(inputs, paths, strict=True))
+        flows = [(_described(drawing.inputs[path.input], path.label), path.output) for path in paths]
+        if bundle is not None:
+            flows.append((_described(Box("whole sets", bundle.lines), ""), bundle.name))
+        width = max(len(source) for source, _ in flows)
+        yield from (f"  {source:<{width}} -> {output}" for source, output in flows)
 
 
 def _described(box: Box, label: str) -> str:

@@ -33,7 +33,7 @@ class Note(NamedTuple):
 
     `common` is the stamp that the set was given, if any. The stamp of a missing input is None. A message is the
     `sent`-th of its output, from 1; that of one that could not be published is 0, and `unpublished` says why, by its
-    input.
+    input. Of a group with a bundle, the set left as the `bundle`-th of these; 0 if that could not be published.
     """
 
     number: int
@@ -44,6 +44,7 @@ class Note(NamedTuple):
     received: Sequence[int | None]
     sent: Sequence[int]
     unpublished: Mapping[int, str]
+    bundle: int = 0
 
 
 def header_stamp(content: Content) -> int:
@@ -58,14 +59,17 @@ class ManifestWriter:
     milliseconds costs by its length, as nothing of it is in the processor's caches.
     """
 
-    def __init__(self, config: GroupConfig, *, node: str, topics: Sequence[tuple[str, str]]) -> None:
-        """Take the node's full name, and each input with its output, as the graph names them."""
+    def __init__(
+        self, config: GroupConfig, *, node: str, topics: Sequence[tuple[str, str]], bundle: str | None
+    ) -> None:
+        """Take the node's full name, each input with its output, and the group's bundle, as the graph names them."""
         self._name, self._node = _text(config.name), _text(node)
         self._policy = _last_text(config.options.policy)
         self.is_by_header = tuple(topic.is_by_header for topic in config.topics)
         """Of which inputs a message's stamp is the one in its header."""
         self._offsets = tuple(topic.offset_ns for topic in config.topics)
         self._names = [(_text(output), _text(source)) for source, output in topics]
+        self._bundle = None if bundle is None else _text(bundle)
         self._templates: dict[tuple[object, ...], bytes] = {}
 
     def write(self, note: Note) -> bytes:
@@ -77,6 +81,8 @@ class ManifestWriter:
         numbers = [note.number, len(stamps) - len(matched), max(matched) - min(matched), note.latency]
         if common is not None:
             numbers.append(common)
+        if self._bundle is not None:
+            numbers.append(note.bundle)
         rows = zip(note.left_as, stamps, note.received, note.sent, strict=True)
         values = [value for row in rows if row[1] is not None for value in row]
         kinds = tuple([None if stamp is None else unpublished.get(index, "") for index, stamp in enumerate(stamps)])
@@ -95,6 +101,8 @@ class ManifestWriter:
         for name in ("set", "missing", "span_ns", "latency_ns"):
             parts += (_key(name), *_number(next(sizes)))
         parts += (_key("common_stamp_ns"), *(_number(next(sizes)) if has_common else (_text(""),)))
+        if self._bundle is not None:
+            parts += (_key("bundle"), self._bundle, _key("bundle_sequence"), *_number(next(sizes)))
         parts += (_key("policy"), self._policy)
         at = len(self._policy) % 4
         for index, why_not in enumerate(kinds):
@@ -120,7 +128,7 @@ class ManifestWriter:
         faults += [f"{unpublished} of {of} not published"] if unpublished else []
         level = _ERROR if unpublished else _WARN if missing else _OK
         message = _text(", ".join(faults) or "complete")
-        version = _COUNT(7) + _key("version") + _text(str(_VERSION))
+        version = _COUNT(7 if self._bundle is None else 9) + _key("version") + _text(str(_VERSION))
         return _text("") + _COUNT(1 + of) + _level(level, 0) + self._name + message + self._node + version
 
     def _input(self, index: int, at: int, why_not: str | None) -> bytes:

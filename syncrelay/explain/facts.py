@@ -242,6 +242,7 @@ class Around(TypedDict, total=False):
     inactive: str | None
     lapses: Sequence[Lapse]
     unbundled: Unbundled | None
+    bundle: str | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -308,6 +309,8 @@ class GroupFacts:
     """The name of a managed node that waits to be activated."""
     unbundled: Unbundled | None = None
     """Why its sets do not leave as one message each, where they should."""
+    bundle: str | None = None
+    """The topic on which its sets leave as one message each, as the graph names it."""
     standing: Standing = Standing.ENOUGH
     """How many of the possible sets leave."""
 

@@ -89,6 +89,7 @@ class Manifests:
     def _connect(self, group: GroupRelay, outlet: Outlet) -> None:
         resolve = self._node.resolve_topic
         topics = [(resolve(each.topic), resolve(each.output)) for each in group.config.topics]
-        writer = ManifestWriter(group.config, node=self._node.name, topics=topics)
+        bundle = None if group.config.bundle is None else resolve(group.config.bundle.topic)
+        writer = ManifestWriter(group.config, node=self._node.name, topics=topics, bundle=bundle)
         begun = self._begun[group] = self.queue.begin(group.config.name, writer, outlet)
         self._loop.call(lambda: group.tell_sets(begun))

@@ -214,6 +214,7 @@ class Monitor:
             inactive=self.inactive,
             lapses=batch.lapses,
             unbundled=self._surroundings.unbundled(binding),
+            bundle=self._surroundings.bundle_of(binding),
         )
         found = judge.judge(facts)
         self._reports[binding.group] = GroupReport(facts, found, batch.last)

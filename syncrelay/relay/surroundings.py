@@ -117,6 +117,11 @@ class Surroundings:
             self._relayed[name] = any(graph.is_relayed(self._graph, each, name) for each in publishers)
         return self._relayed[name]
 
+    def bundle_of(self, binding: GroupBinding) -> str | None:
+        """Return the name in the graph of the topic on which the sets of a group leave as bundles, if they do."""
+        bundle = binding.group.config.bundle
+        return None if bundle is None else self._node.resolve_topic(bundle.topic)
+
     def unbundled(self, binding: GroupBinding) -> Unbundled | None:
         """Return why the sets of a group do not leave as bundles, where they should."""
         group, bundle = binding.group, binding.group.config.bundle

@@ -275,6 +275,8 @@ class Group:
     """How far apart the stamps of a set may be; null where no key of the file says so."""
     max_wait_ms: Number | None
     """How long a set may wait."""
+    bundle: Text | None = None
+    """The topic on which each set leaves as one message; null without `bundle`."""
     sets: int
     """Sets published since the start."""
     rate_hz: Rate

@@ -148,6 +148,7 @@ def group_of(report: GroupReport) -> document.Group:
         queue_size=facts.queue_size,
         tolerance=_tolerance(facts.tolerance),
         max_wait_ms=_ms(facts.max_wait),
+        bundle=facts.bundle,
         sets=figures.sets,
         rate_hz=round(figures.rate_hz, 3),
         possible_hz=round(facts.possible_hz, 3),

@@ -70,7 +70,8 @@ def options(group: Group) -> str:
     """Return the policy and the options of a group."""
     tolerance = [f"{group.tolerance.key} {duration(group.tolerance.ms)}"] if group.tolerance else []
     waits = [] if group.max_wait_ms is None else [f"max_wait {duration(group.max_wait_ms)}"]
-    return ", ".join([group.policy, *tolerance, f"queue_size {group.queue_size}", *waits])
+    bundle = [] if group.bundle is None else [f"bundle {group.bundle}"]
+    return ", ".join([group.policy, *tolerance, f"queue_size {group.queue_size}", *waits, *bundle])
 
 
 def phase(relay: Relay) -> str:

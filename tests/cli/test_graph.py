@@ -32,6 +32,11 @@ groups:
     policy: latest_time
     trigger: 29.97 Hz
     topics: [{topic: /lidar}, {topic: /odom}]
+  whole:
+    policy: latest_time
+    trigger: /lidar
+    bundle: {topic: set, type: my_msgs/msg/Set}
+    topics: [{topic: /lidar}, {topic: /imu, type: sensor_msgs/msg/Imu}]
 """
 _TEXT = """\
 fusion.yaml
@@ -47,9 +52,14 @@ state: latest_time, queue_size 20
 fixed: latest_time, trigger 29.97 Hz, queue_size 20
   /lidar (sensor_msgs/msg/PointCloud2) -> /fixed/lidar
   /odom (type from the graph)          -> /fixed/odom
+
+whole: latest_time, queue_size 20
+  /lidar (sensor_msgs/msg/PointCloud2, trigger) -> /whole/lidar
+  /imu (sensor_msgs/msg/Imu)                    -> /whole/imu
+  whole sets (my_msgs/msg/Set)                  -> /robot/set
 """
 _BOX = Box(_HOSTILE, (_HOSTILE, "slop 20ms"))
-_ANYTHING = Drawing(_HOSTILE, (_BOX,), ((_BOX, (Path(0, _HOSTILE, is_optional=True, output=_HOSTILE),)),))
+_ANYTHING = Drawing(_HOSTILE, (_BOX,), ((_BOX, (Path(0, _HOSTILE, is_optional=True, output=_HOSTILE),), _BOX),))
 
 
 def test_the_text_has_what_the_file_says(tmp_path: pathlib.Path):
@@ -80,7 +90,7 @@ def test_mermaid_has_lines_of_its_grammar_alone_whatever_is_drawn(drawing: Drawi
 @pytest.mark.parametrize("path", sorted((pathlib.Path(ROOT) / "configs").glob("*.yaml")), ids=lambda path: path.stem)
 def test_every_path_of_an_example_is_drawn_in_both_forms(path: pathlib.Path):
     drawing = drawing_of(load(str(path)), title=path.name)
-    paths = [each for _, paths in drawing.groups for each in paths]
+    paths = [each for _, paths, _ in drawing.groups for each in paths]
     mermaid, text = list(as_mermaid(drawing)), list(as_text(drawing))
     assert sum("> g" in line or "| g" in line for line in mermaid) == len(paths)
     assert sum(" -> " in line for line in text) == len(paths)

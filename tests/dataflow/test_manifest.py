@@ -24,10 +24,10 @@ def test_others_read_what_was_written(data, name, node, number, latency):
         members[0] = data.draw(_MEMBERS)
     common = data.draw(st.one_of(st.none(), _STAMPS))
     topics = [(f"/{each}", f"/out/{each}") for each in tokens]
-    writer = ManifestWriter(
-        group_of(name=name, topics=[each for each, _ in topics]).config, node=f"/{node}", topics=topics
-    )
-    payload = writer.write(note(number, members, common=common, latency=latency))
+    bundle = data.draw(st.one_of(st.none(), _NAMES.map("/{}".format)))
+    config = group_of(name=name, topics=[each for each, _ in topics]).config
+    writer = ManifestWriter(config, node=f"/{node}", topics=topics, bundle=bundle)
+    payload = writer.write(note(number, members, common=common, latency=latency)._replace(bundle=number - 1))
 
     told = read(payload)
     stamps = [each.original_stamp for each in members if each is not None]
@@ -47,6 +47,8 @@ def test_others_read_what_was_written(data, name, node, number, latency):
         common_stamp=common,
         policy="exact_time",
         inputs=(),
+        bundle=bundle,
+        bundle_sequence=None if bundle is None else str(number - 1),
     )
     assert told.inputs == tuple(
         ToldInput(STALE, output, topic, "missing")
@@ -64,6 +66,6 @@ def test_others_read_what_was_written(data, name, node, number, latency):
 
 def test_a_long_reason_is_told_in_part():
     group = group_of(topics=["/a", "/b"])
-    writer = ManifestWriter(group.config, node="/n", topics=[("/a", "/x"), ("/b", "/y")])
+    writer = ManifestWriter(group.config, node="/n", topics=[("/a", "/x"), ("/b", "/y")], bundle=None)
     members = [Member(1, 1, 1, 0, "no room\0, " * 100), Member(1, 1, 1, 1)]
     assert 0 < len(read(writer.write(note(1, members))).inputs[0].message) <= 200

@@ -35,7 +35,7 @@ class _Told:
         self.group = group_of(name=name, **{"topics": ["/a", "/b"], **keys})
         self.outlets, self.manifest = (Outlet(), Outlet()), Outlet()
         topics = [("/a", f"/{name}/a"), ("/b", f"/{name}/b")]
-        writer = ManifestWriter(self.group.config, node="/syncrelay", topics=topics)
+        writer = ManifestWriter(self.group.config, node="/syncrelay", topics=topics, bundle=None)
         self.manifests: GroupManifests = queue.begin(name, writer, self.manifest)
         self.group.tell_sets(self.manifests)
         connect(self.group, self.outlets)
@@ -179,7 +179,7 @@ def test_a_group_that_takes_the_place_of_another_is_told_behind_it(queue):
     before = _Told(queue)
     before.feed_sets(2)
     after = GroupRelay(before.group.config, now=lambda: 0)
-    writer = ManifestWriter(after.config, node="/syncrelay", topics=[("/a", "/x"), ("/b", "/y")])
+    writer = ManifestWriter(after.config, node="/syncrelay", topics=[("/a", "/x"), ("/b", "/y")], bundle=None)
     after.tell_sets(queue.begin("front", writer, before.manifest))
     for index in range(2):
         after.connect(index, Outlet(), restamped=False)

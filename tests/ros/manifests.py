@@ -62,6 +62,8 @@ class Told(NamedTuple):
     common_stamp: int | None
     policy: str
     inputs: tuple[ToldInput, ...]
+    bundle: str | None = None
+    bundle_sequence: str | None = None
 
 
 def read(payload: bytes) -> Told:

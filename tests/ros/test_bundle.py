@@ -132,15 +132,27 @@ def _last_told(collector: Collector) -> Told:
 
 @both_backends
 def test_a_common_stamp_is_in_the_members_too_and_outputs_are_left_as_they_were(sourced: Stage, pair: MadeMessages):
-    sourced.relay(config({"front": _group(restamp="latest")}))
+    relay = sourced.relay(config({"front": _group(restamp="latest")}, metrics=ANY_PORT))
     topics = {"/front/set": _PAIR, "/front/rig/left": VECTOR}
-    collector = sourced.collector(topics)
-    player, first = _connected(sourced, collector, *topics)
+    collector = sourced.collector({**topics, _MANIFEST: MANIFEST_TYPE})
+    player, first = _connected(sourced, collector, *topics, _MANIFEST)
     before = [collector.count(topic) for topic in topics]
     player.play([frame for number in range(first, first + 31) for frame in _frames(number)], speed=1e9)
     bundles, lefts = (
         collector.wait_for(topic, had + 30)[had : had + 30] for topic, had in zip(topics, before, strict=True)
     )
+    last = pair.decode(collector.payloads("/front/set")[-1], _PAIR).number
+    collector.process.wait_until(lambda: _last_told(collector).number >= last, "the last manifest")
+    told = _last_told(collector)
+    # The first sets may have left before the bundle's publisher was there.
+    assert {read(each).bundle for each in collector.payloads(_MANIFEST)} == {"/front/set"}
+    sequences = [int(read(each).bundle_sequence or 0) for each in collector.payloads(_MANIFEST)[-30:]]
+    assert sequences == list(range(sequences[0], sequences[0] + 30))
+    assert sequences[-1] <= told.number
+    assert {each.output for each in told.inputs} == {"/front/rig/left", "/front/rig/right"}
+    wait_until(lambda: "front" in groups_of(relay), "the status of the group")
+    assert groups_of(relay)["front"]["bundle"] == "/front/set"
+    relay.wait_for_log("/rig/right -> /front/rig/right, whole sets -> /front/set")
     for number, bundle, left in zip(range(first, first + 30), bundles, lefts, strict=True):
         latest = max(stamp_of(frame.payload) for frame in _frames(number))
         found = pair.decode(bundle, _PAIR)

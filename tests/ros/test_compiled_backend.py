@@ -109,7 +109,7 @@ def test_a_group_that_ends_gives_its_memory_back_without_the_collector(here):
     source = here.backend.source(topic.subscription, handler(group, 0, Vector3Stamped))
     outlet = here.backend.outlet(topic.publisher)
     group.connect(0, outlet, restamped=False)
-    writer = ManifestWriter(group.config, node="/n", topics=[("/camera", "/a"), ("/lidar", "/b")])
+    writer = ManifestWriter(group.config, node="/n", topics=[("/camera", "/a"), ("/lidar", "/b")], bundle=None)
     queue = ManifestQueue(bugs=Bugs())
     group.tell_sets(queue.begin("front", writer, outlet))
     for n in range(20):

@@ -20,7 +20,7 @@ DiagnosticArray = pytest.importorskip("diagnostic_msgs.msg").DiagnosticArray
 _JOINER = runpy.run_path(str(Path(__file__).parents[2] / "examples/join_sets.py"))["SetJoiner"]
 _TOPICS = ("/a", "/b", "/c")
 _GROUP = load_text(config({"front": {"policy": "exact_time", "topics": inputs(dict.fromkeys(_TOPICS, VECTOR))}}))
-_WRITER = ManifestWriter(_GROUP.groups[0], node="/syncrelay", topics=[(topic, topic) for topic in _TOPICS])
+_WRITER = ManifestWriter(_GROUP.groups[0], node="/syncrelay", topics=[(topic, topic) for topic in _TOPICS], bundle=None)
 
 
 def _message(stamp: int, *, has_header: bool) -> SimpleNamespace:

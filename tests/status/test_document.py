@@ -76,6 +76,7 @@ def test_what_is_said_of_a_group():
         "queue_size": 10,
         "tolerance": {"key": "slop", "ms": 20.0},
         "max_wait_ms": None,
+        "bundle": None,
         "sets": 30,
         "rate_hz": 10.0,
         "possible_hz": 10.0,

@@ -93,7 +93,9 @@ class SetWriter:
             stamps = [each and each.stamp for each in left]
             received = [each and each.received for each in left]
             latency = now - max(each for each in received if each is not None)
-            note = Note(manifest.output.count + 1, latency, outcome.stamp, outcome.stamps, stamps, received, sent, {})
+            number, bundles = manifest.output.count + 1, self._bundles.get(binding.group.name)
+            note = Note(number, latency, outcome.stamp, outcome.stamps, stamps, received, sent, {})
+            note = note._replace(bundle=0 if bundles is None else bundles.output.count)
             self._recording.write(manifest.output, manifest.writer.write(note), now)
 
     def _left(self, each: Input, message: Message, stamp: int | None) -> _Left:
@@ -130,7 +132,8 @@ class SetWriter:
     def _manifest(self, binding: GroupBinding) -> "_Manifest":
         node = binding.group.inputs.node
         topics = [(each.topic, each.output) for each in binding.inputs]
-        writer = ManifestWriter(binding.group, node=node.absolute("~"), topics=topics)
+        bundle = None if binding.group.bundle is None else node.absolute(binding.group.bundle.topic)
+        writer = ManifestWriter(binding.group, node=node.absolute("~"), topics=topics, bundle=bundle)
         topic, profile = node.absolute(manifest_topic(binding.group.name)), Profile(depth=MANIFEST_DEPTH)
         return _Manifest(writer, self._recording.add(topic, MANIFEST_TYPE, *jazzy_definition(MANIFEST_TYPE), profile))
 

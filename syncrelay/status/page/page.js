@@ -161,7 +161,8 @@ function showGroup(group) {
 function options(group) {
   const tolerance = group.tolerance ? [`${group.tolerance.key} ${duration(group.tolerance.ms)}`] : [];
   const waits = group.max_wait_ms === null ? [] : [`max_wait ${duration(group.max_wait_ms)}`];
-  return [group.policy, ...tolerance, `queue_size ${group.queue_size}`, ...waits].join(", ");
+  const bundle = group.bundle ? [`bundle ${group.bundle}`] : [];
+  return [group.policy, ...tolerance, `queue_size ${group.queue_size}`, ...waits, ...bundle].join(", ");
 }
 
 function ofPossible(group) {

@@ -45,6 +45,7 @@ _DEFINITIONS = {
     "rig_msgs/msg/Turn": _TURN,
 }
 _RIG = rig(10)
+_MANIFEST = "/syncrelay/front/sets"
 _BUNDLE = {"bundle": {"topic": "/set", "type": _SET}}
 
 
@@ -91,10 +92,13 @@ def test_sets_are_written_as_bundles_alone_or_beside_the_outputs(tmp_path):
     beside = write(bag, tmp_path / "beside.mcap", **_BUNDLE)
     assert payloads(beside, "/set") == expected
     assert [each for each in beside if each.topic != "/set"] == plain
+    told = [read(each) for each in payloads(write(bag, tmp_path / "told.mcap", **_BUNDLE, manifest=True), _MANIFEST)]
+    assert [(each.bundle, each.bundle_sequence) for each in told] == [("/set", str(each.number)) for each in told]
+    assert {one.output for each in told for one in each.inputs} == {"/front/camera", "/front/lidar"}
     alone = write(bag, tmp_path / "alone.mcap", **_BUNDLE, outputs=False, manifest=True)
     assert payloads(alone, "/set") == expected
-    assert {each.topic for each in alone} == {"/set", "/syncrelay/front/sets"}
-    for number, payload in enumerate(payloads(alone, "/syncrelay/front/sets"), 1):
+    assert {each.topic for each in alone} == {"/set", _MANIFEST}
+    for number, payload in enumerate(payloads(alone, _MANIFEST), 1):
         assert [(each.output, each.sequence) for each in read(payload).inputs] == [("/set", number)] * 2
 
 
