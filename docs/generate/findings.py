@@ -13,7 +13,7 @@ _SAID_AS = {
     (Severity.WARN,): _WARN,
     (Severity.ERROR,): _ERROR,
     (Severity.OK, Severity.WARN): f"{_OK} or {_WARN}",
-    (Severity.WARN, Severity.ERROR): f"{_ERROR} where it keeps sets from leaving, otherwise {_WARN}",
+    (Severity.WARN, Severity.ERROR): f"{_ERROR} or {_WARN}",
     tuple(Severity): f"{_OK}, {_WARN} or {_ERROR}",
 }
 

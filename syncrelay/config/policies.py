@@ -109,9 +109,9 @@ class ApproximateTimeGroup(SlopGroup):
         ge=0,
         allow_inf_nan=False,
         description=(
-            "How much smaller a later set's span has to be for the later set to be preferred, as a fraction of the"
-            " time that it comes later: how much closer it must be to be worth waiting for. 0 takes the smallest span,"
-            " 1 mostly the first set. Default: 0.1."
+            "A later set replaces an earlier one only if its span is smaller by this fraction of the delay: with 0.1, a"
+            " set 50 ms later must be at least 5 ms tighter. 0 takes the smallest span, 1 mostly the first set."
+            " Default: 0.1."
         ),
         examples=[0.1],
     )
@@ -182,8 +182,9 @@ class LatestTimeGroup(Group):
     )
     trigger: Trigger = Field(
         description=(
-            "Input whose every message makes a set; or a rate, at which the clock does: then a set leaves at each tick,"
-            " `max_wait` after it, of what has come by then. A number is Hz, a string has a unit (Hz, kHz)."
+            "Either an input topic (each of its messages makes a set) or a rate such as 30 Hz (each clock tick makes a"
+            " set, which leaves `max_wait` later with what has come by then). A number is Hz, a string has a unit (Hz,"
+            " kHz)."
         ),
         examples=["/camera/image_raw", "30 Hz"],
     )

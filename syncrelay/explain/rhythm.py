@@ -63,7 +63,7 @@ _ABOUT: Final = 0.25
 # ... and hardly any is far longer. Otherwise messages come several at a time.
 _FAR: Final = 4
 _HARDLY: Final = 0.1
-# Or most are so near to whole multiples of the shortest that it is no chance.
+# Or most are near to whole multiples of the shortest, significantly often.
 _MOSTLY: Final = 0.8
 _BY_CHANCE: Final = 1e-4
 # How near they are is known no better than this.
