@@ -4,6 +4,8 @@ from typing import Final
 
 _UNITS: Final = ((1_000_000_000, "s"), (1_000_000, "ms"), (1_000, "us"))
 _STEPS: Final = (10, 11, 12, 13, 14, 15, 16, 18, 20, 22, 25, 28, *range(30, 105, 5))
+# The longest round one that 64 bits can hold.
+_LONGEST: Final = 9_000_000_000 * 1_000_000_000
 
 
 def duration(nanoseconds: float) -> str:
@@ -52,7 +54,11 @@ def share(part: float) -> str:
 
 
 def at_least(nanoseconds: int) -> str:
-    """Return a duration as it stands in the file: the next round one that is not shorter, such as 75ms."""
+    """Return a duration as it stands in the file: the next round one that is not shorter, such as 75ms.
+
+    Of what no file can hold it is the longest.
+    """
+    nanoseconds = min(nanoseconds, _LONGEST)
     round_one = 1
     while round_one * 10 < nanoseconds:
         round_one *= 10

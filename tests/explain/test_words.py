@@ -53,6 +53,7 @@ READ: dict[Callable[[Any], str], dict[float, str]] = {
         101 * MS: "110ms",
         1 * S: "1s",
         1210 * MS: "1.3s",
+        2**63: "9000000000s",
     },
     words.exactly: {37_204_400_000: "37.204s", -12 * MS: "-12ms", 999.6 * MS: "1s", -2 * S: "-2s"},
 }
