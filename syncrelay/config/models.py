@@ -115,10 +115,9 @@ class Topic(Keys):
     clock: Literal["host", "device"] = Field(
         default="host",
         description=(
-            "Which clock made the stamps. Those of a `device` with a clock of its own are mapped to the host's time"
-            " before they are matched, from when its messages arrive: its rate, and whether it was set or began anew,"
-            " are found out. The set's common stamp, where `restamp` gives one, is of the host's time too."
-            " Default: host, nothing is mapped."
+            "Which clock made the stamps. Stamps of a `device` with a clock of its own are mapped to the host's time"
+            " before matching. The mapping follows the device's rate, and its clock when that is set or restarts, by"
+            " when messages arrive. A stamp that `restamp` gives is in the host's time too. Default: host, no mapping."
         ),
         examples=["device"],
     )
@@ -285,10 +284,10 @@ class Group(Keys):
     max_wait: Annotated[Duration | None, NOT_NULL] = Field(
         default=None,
         description=(
-            "How long a set may wait, once its required messages, or its `quorum`, are there, for optional ones or for"
-            " a closer match; then it leaves as it is. Needed if an input is optional, except with latest_time, which"
-            " never waits for one. Where a clock is the trigger: how long after its tick a set leaves, always. A number"
-            " is seconds, a string has a unit (ns, us, ms, s, min). Default: no limit."
+            "How long a set with its required messages, or its `quorum`, waits for optional ones or for a closer match;"
+            " then it leaves as it is. Needed if an input is optional, except with latest_time, which never waits for"
+            " one. If a clock is the trigger, each set leaves this long after its tick. A number is seconds, a string"
+            " has a unit (ns, us, ms, s, min). Default: no limit."
         ),
         examples=["100ms"],
     )
@@ -310,9 +309,9 @@ class Group(Keys):
     restamp: Annotated[str, BeforeValidator(_restamp)] = Field(
         default="none",
         description=(
-            "Stamp of all messages of a set as they leave: `none` (each keeps its own), `earliest` or `latest` of the"
-            " set, the name of an input topic, whose stamp all get, or, with latest_time, `trigger`: that of the"
-            " trigger's message, or the time of the clock's tick. Default: none."
+            "The stamp that all messages of a set leave with: `earliest` or `latest` of the set, that of an input topic"
+            " by its name, or with latest_time `trigger`: that of the trigger's message, or the time of the clock's"
+            " tick. Default: none, each keeps its own."
         ),
         examples=["none", "earliest", "latest", "trigger", "/lidar/points"],
     )

@@ -92,9 +92,9 @@ class MetricsConfig(Keys):
     hosts: tuple[Host, ...] = Field(
         default=(),
         description=(
-            "Other host names that requests may use, such as that of a Kubernetes service: a page in a browser cannot"
-            " read the status under any other name. Names of this machine need not be listed; nor need addresses, where"
-            " `listen` is open to other machines. Default: none."
+            "Other host names that requests may use, such as that of a Kubernetes service. Under any other name no page"
+            " in a browser can read the status. Names of this machine, and addresses if `listen` is open to other"
+            " machines, need not be listed. Default: none."
         ),
         examples=[["robot.lab.example"]],
     )
