@@ -77,17 +77,27 @@ def _edge(missing: Missing) -> str:
 def _late(missing: Missing, name: str, covered: Sequence[Lapse], facts: GroupFacts) -> tuple[str, str]:
     edge, wait = _edge(missing), facts.transforms.wait if facts.transforms is not None else 0
     needed = max((each.needed_ns or 0 for each in covered), default=0)
+    enough = enough_wait(covered)
     if not covered and not missing.by_ns:
         return f"nothing is known of {edge} yet", _CHECK_BROADCASTER
     if not covered:
         return f"{edge} is {words.span_of_time(missing.by_ns)} behind {name}", _CHECK_BROADCASTER
-    times = [each.covered or 0 for each in covered]
-    # What came back after a break had all that waited leave at once, or nearly: no wait is for that.
-    if max(times) - min(times) < needed or needed > _LONGEST_WAIT:
+    if enough is None:
         return f"{edge} was up to {words.duration(needed)} behind {name}", _CHECK_BROADCASTER
     text = f"{edge} is {words.duration(needed)} behind {name}"
     if needed <= wait:
         # As many wait at once as are matched in that time.
         size = max(facts.queue_size, ceil(needed / SECOND * facts.possible_hz)) + 1
         return f"{text}, and no more than {counted(facts.queue_size, 'set')} can wait", f"write `queue_size: {size}`"
-    return text, f"write `wait: {words.at_least(min(needed + needed // 10, _LONGEST_WAIT))}`"
+    return text, f"write `wait: {enough}`"
+
+
+def enough_wait(lapses: Sequence[Lapse]) -> str | None:
+    """Return the wait that sets which were given up would have needed, and a tenth more; None if none is for that."""
+    covered = [each for each in lapses if each.needed_ns is not None]
+    needed = max((each.needed_ns or 0 for each in covered), default=0)
+    times = [each.covered or 0 for each in covered]
+    # What came back after a break had all that waited leave at once, or nearly: no wait is for that.
+    if not times or max(times) - min(times) < needed or needed > _LONGEST_WAIT:
+        return None
+    return words.at_least(min(needed + needed // 10, _LONGEST_WAIT))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from copy import deepcopy
 from dataclasses import dataclass
 from io import StringIO
 from typing import Any, Final
@@ -19,7 +20,10 @@ _WIDEST: Final = 10_000
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A key of a group, or of one of its topics by index, its better value as it stands in a file, and why."""
+    """A key of a group, or of one of its topics by index, its better value as it stands in a file, and why.
+
+    A key in a mapping of the group has the name of that before it: `transforms.wait`.
+    """
 
     group: str
     topic: int | None
@@ -39,7 +43,13 @@ def with_changes(text: str, changes: Sequence[Change]) -> str:
             group = document["groups"][change.group]
             if change.key == _POLICY:
                 _fit(group, str(change.value))
-            _set(group if change.topic is None else group["topics"][change.topic], change)
+            mapping = group if change.topic is None else group["topics"][change.topic]
+            *sections, key = change.key.split(".")
+            for section in sections:
+                if section not in mapping:
+                    mapping[section] = deepcopy(document["defaults"][section])
+                mapping = mapping[section]
+            _set(mapping, key, change)
 
     return edited(text, change_all)
 
@@ -77,7 +87,10 @@ def patch(changes: Sequence[Change], names: dict[str, Sequence[str]]) -> str:
     for change in changes:
         group = groups.setdefault(change.group, {})
         if change.topic is None:
-            group[change.key] = change.value
+            *sections, key = change.key.split(".")
+            for section in sections:
+                group = group.setdefault(section, {})
+            group[key] = change.value
         else:
             topics = group.setdefault("topics", {})
             topics.setdefault(change.topic, {"topic": names[change.group][change.topic]})[change.key] = change.value
@@ -88,12 +101,12 @@ def patch(changes: Sequence[Change], names: dict[str, Sequence[str]]) -> str:
     return _dumped(_editor(), {"groups": groups})
 
 
-def _set(mapping: Any, change: Change) -> None:
-    own = [key for key, _ in mapping.non_merged_items()]
-    if change.key not in own and "topics" in own:
-        mapping.insert(own.index("topics") + bool(mapping.merge), change.key, change.value)
-    mapping[change.key] = change.value
-    _comment(mapping, change.key, change.reason)
+def _set(mapping: Any, key: str, change: Change) -> None:
+    own = [each for each, _ in mapping.non_merged_items()]
+    if key not in own and "topics" in own:
+        mapping.insert(own.index("topics") + bool(mapping.merge), key, change.value)
+    mapping[key] = change.value
+    _comment(mapping, key, change.reason)
 
 
 def _comment(mapping: Any, key: str, comment: str) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from syncrelay.config import GroupConfig
 from syncrelay.explain import EngineDriver
 from syncrelay.recordings.analysis.streams import Stream, messages, transforms_beside
-from syncrelay.sync import DropReason, InputCounts, Match, Outcome
+from syncrelay.sync import DropReason, InputCounts, Lapse, Match, Outcome
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +36,7 @@ class Evaluation:
     counts: tuple[InputCounts, ...]
     sets: tuple[SetOut, ...]
     drops: tuple[DropOut, ...]
+    lapses: tuple[Lapse, ...] = ()
 
 
 class Outcomes:
@@ -67,4 +68,4 @@ def evaluate(group: GroupConfig, streams: Sequence[Stream]) -> Evaluation:
     outcomes = Outcomes(group)
     driver = EngineDriver(group, outcomes.take, transforms_beside(streams))
     driver.run(messages(streams))
-    return Evaluation(driver.engine.counts(), tuple(outcomes.sets), tuple(outcomes.drops))
+    return Evaluation(driver.engine.counts(), tuple(outcomes.sets), tuple(outcomes.drops), tuple(driver.engine.lapses))

@@ -14,6 +14,7 @@ from syncrelay.explain.changes import Changes
 from syncrelay.explain.epochs import BOOT_NS
 from syncrelay.explain.nearest import Received, quantile
 from syncrelay.explain.other_stamps import by_offset_of_clock, by_other_stamps, if_delay_is_known, wandering
+from syncrelay.explain.rules_transforms import enough_wait
 from syncrelay.explain.trials import Trials
 from syncrelay.recordings.analysis.changes import Change
 from syncrelay.recordings.analysis.evaluation import Evaluation, evaluate
@@ -57,6 +58,28 @@ def suggest(
     changed: Callable[[Sequence[Change]], GroupConfig],
 ) -> Suggestion:
     """Return better values for a group; `changed` gives the group with changes made, `trials` are those without."""
+    found = _matching(group, streams, trials, evaluation, changed)
+    waits = tuple(_waits(evaluate(changed(found.changes), streams) if found.changes else evaluation, group))
+    if waits and len(evaluate(changed([*found.changes, *waits]), streams).sets) > len(evaluation.sets):
+        return replace(found, changes=(*found.changes, *waits))
+    return found
+
+
+def _waits(evaluation: Evaluation, group: GroupConfig) -> Iterator[Change]:
+    """Wait for transforms as long as they lag."""
+    transforms, wait = group.options.transforms, enough_wait(evaluation.lapses)
+    if transforms is not None and wait is not None and parse_duration(wait) > transforms.wait:
+        yield Change(group.name, None, "transforms.wait", wait, "transforms lag behind the messages by nearly that")
+
+
+def _matching(
+    group: GroupConfig,
+    streams: Sequence[Stream],
+    trials: Trials,
+    evaluation: Evaluation,
+    changed: Callable[[Sequence[Change]], GroupConfig],
+) -> Suggestion:
+    """Return better values for what is matched."""
     if keys := group.options.matched_by:
         deciding = f"{all_of(f'`{key}`' for key in keys)} {'decide' if len(keys) > 1 else 'decides'}"
         return Suggestion((), (f"no values to suggest: {deciding} which messages belong together",), 0, 0, 0)

@@ -3,7 +3,9 @@
 import re
 
 import pytest
+import yaml
 
+from syncrelay.config import load
 from syncrelay.explain import Code, Severity
 from syncrelay.recordings.analysis.evaluation import evaluate
 from syncrelay.recordings.analysis.few_sets import why_few_sets
@@ -11,6 +13,7 @@ from syncrelay.recordings.analysis.streams import read_streams
 from syncrelay.recordings.analysis.watching import watch_group
 from syncrelay.recordings.bag.replay import replay
 from syncrelay.sync import Drop, DropReason, Match
+from tests.cli.command import run_here
 from tests.recordings.bag.making import CUSTOM_STORE, HEADERLESS, write_mcap, write_ros1, write_rosbag2
 from tests.recordings.bag.reading import bound
 from tests.ros.cdr_messages import VECTOR, vector
@@ -78,6 +81,27 @@ def test_a_set_is_dropped_once_it_has_waited_too_long(late, sets, tmp_path):
     evaluation, _ = evaluated(path)
     assert [set_.left for set_ in evaluation.sets] == [now for each, now in left if isinstance(each, Match)]
     assert [each.dropped for each in evaluation.counts] == [each.counts.dropped for each in result.inputs]
+
+
+@pytest.mark.parametrize("section", ["groups", "defaults"])
+def test_analyze_writes_a_wait_that_is_enough(section, tmp_path):
+    path = write_mcap(tmp_path / "drive.mcap", frames(late=150 * MS))
+    file, written = tmp_path / "fusion.yaml", tmp_path / "better.yaml"
+    text = FILE
+    if section == "defaults":
+        document = yaml.safe_load(FILE)
+        document["defaults"] = {"transforms": document["groups"]["front"].pop("transforms")}
+        text = yaml.safe_dump(document, sort_keys=False)
+    file.write_text(text)
+    done = run_here("analyze", str(path), "--config", str(file), "--write", str(written), folder=tmp_path)
+    assert done.returncode in (0, 1), done.stderr
+    (group,) = load(str(written)).groups
+    assert group.options.transforms is not None
+    assert group.options.transforms.target == "odom"
+    assert 150 * MS < group.options.transforms.wait < 200 * MS
+    left, _ = replayed(path, written.read_text())
+    # Those that were matched last waited for what was not recorded.
+    assert sum(isinstance(each, Match) for each, _ in left) > 35
 
 
 def test_a_recording_without_transforms_gives_no_sets_and_messages_without_a_header_need_none(tmp_path):
