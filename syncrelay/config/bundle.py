@@ -143,6 +143,9 @@ class BundleType:
             if "/" in each and not {"[", "<"} & {*each} and name not in roles_in(self.fields)
         ]
         held = f"it holds {all_of(messages)}" if messages else "it holds no messages"
+        wanted = type_name.replace("/msg/", "/")
+        if arrays := [name for name, each in self.fields.items() if re.search(rf"(^|<){wanted}(,|>|\[)", each)]:
+            held += f"; a bundle fills no arrays of messages, as {all_of(arrays)}"
         return f"{self.name} has too few fields of {type_name} for {all_of(topics)}: {held}"
 
 

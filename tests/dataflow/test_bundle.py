@@ -100,3 +100,9 @@ def test_an_input_without_a_field_is_refused():
     types = {**_TYPES, "rig_msgs/Set": {"left": "geometry_msgs/Vector3Stamped"}}
     with pytest.raises(BundleError, match="rig_msgs/msg/Set has too few fields of geometry_msgs/msg/Vector3Stamped"):
         Bundle(group.config, types.__getitem__, _DEFAULT)
+
+
+def test_a_type_that_holds_arrays_of_an_inputs_messages_has_no_field_for_it():
+    types = {**_TYPES, "rig_msgs/Set": {"all": "sequence<geometry_msgs/Vector3Stamped, 3>", "number": "uint64"}}
+    with pytest.raises(BundleError, match="it holds no messages; a bundle fills no arrays of messages, as all"):
+        Bundle(_group(FLOWS[0]).config, types.__getitem__, _DEFAULT)

@@ -36,13 +36,13 @@ def drawn_type(chance: random.Random) -> tuple[Any, str]:
 
 
 def drawn_set(chance: random.Random) -> tuple[Any, str]:
-    """Return a typestore and a type in it whose fields are messages, between others."""
+    """Return a typestore and a type in it whose fields are messages and arrays of them, between others."""
     definitions: dict[str, str] = {}
     lines = []
     for number in range(chance.randint(2, 8)):
-        if chance.random() < 0.6:
+        if chance.random() < 0.9:
             kind = _define(chance, definitions, 2).replace("/msg/", "/")
-            lines.append(f"{kind} f{number}\n")
+            lines.append(f"{kind}{chance.choice(['', '', '', '', *_SHAPES])} f{number}\n")
         else:
             lines.append(f"{chance.choice([*_NUMBERS, 'string'])}{chance.choice(_SHAPES)} f{number}\n")
     definitions["made_msgs/msg/Set"] = "".join(lines)
