@@ -17,6 +17,7 @@ from rounds import PATIENCE_S, free_domains, processes, side_by_side
 from spent import threads_ns
 
 SMALL = "2 x 200 Hz x 1 kB"
+ONE_MB = {"2 x 20 Hz x 1 MB": LOADS["2 x 20 Hz x 1 MB"]}
 LARGE_LOADS = {
     "2 x 20 Hz x 1 MB, large_messages": LOADS["2 x 20 Hz x 1 MB"],
     "2 x 20 Hz x 1 MB, default transport": Load("Image", 1_000_000, 20),
@@ -62,8 +63,9 @@ class Tables:
             self._compare(load, [CHECKOUT, f"{CHECKOUT}@tapped"])
 
     def bundled(self):
-        for load in (SMALL, "2 x 20 Hz x 1 MB"):
-            self._compare(load, [CHECKOUT, f"{CHECKOUT}@bundled"])
+        middle = replace(LOADS["2 x 20 Hz x 1 MB"], size=100_000)
+        for name, load in {SMALL: LOADS[SMALL], "2 x 20 Hz x 100 kB": middle, **ONE_MB}.items():
+            self._show(name, [self._workshop.candidate(word, load) for word in (CHECKOUT, f"{CHECKOUT}@bundled")])
 
     def large(self):
         self._loads("large messages", LARGE_LOADS)
