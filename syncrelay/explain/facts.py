@@ -239,6 +239,7 @@ class Around(TypedDict, total=False):
     asleep: bool
     empty_graph: GraphSnapshot | None
     is_discovering: bool
+    is_look: bool
     inactive: str | None
     lapses: Sequence[Lapse]
     unbundled: Unbundled | None
@@ -301,6 +302,8 @@ class GroupFacts:
     """The graph, where it holds no node but our own."""
     is_discovering: bool = False
     """Whether running nodes may be missing from the graph, because this one has just joined it."""
+    is_look: bool = False
+    """Whether somebody looks for a while and then goes by what was said: what is not known is not well."""
     transforms: TransformsConfig | None = None
     """The transforms for which its sets wait."""
     lapses: Sequence[Lapse] = ()

@@ -321,6 +321,10 @@ def with_ok(facts: GroupFacts, found: tuple[Finding, ...]) -> tuple[Finding, ...
     elif share.value is None and share.left < share.possible:
         text = f"{share.left} of {share.possible} possible sets so far, which is too soon to judge"
         severity = Severity.OK
+    elif facts.is_look and share.value is None and not share.is_certain:
+        few = facts.pacemaker.name if share.pacemaker is None else facts.inputs[share.pacemaker].name
+        sets = "1 set" if figures.sets == 1 else f"{figures.sets} sets"
+        text, severity = f"{sets} so far, but too few messages of {few} to tell how many were possible", Severity.OK
     else:
         code, severity = Code.HEALTHY, Severity.OK
         sets = f"{words.figure(figures.rate_hz)} of {words.figure(max(facts.possible_hz, figures.rate_hz))}"

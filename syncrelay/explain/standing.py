@@ -56,7 +56,8 @@ class Share:
 
     The needed input with the fewest messages, received or expected, limits what is `possible`. It is the `pacemaker`;
     None if a clock makes the sets. `absent` counts its messages that should have come, at its usual pace, and did not.
-    `is_pausing` is set while those of any input still do not come.
+    `is_pausing` is set while those of any input still do not come. `is_certain` is unset where more sets may have been
+    possible: nothing shows what a pacemaker without a steady pace lost.
     """
 
     left: int = 0
@@ -65,6 +66,7 @@ class Share:
     pacemaker: int | None = None
     absent: int = 0
     is_pausing: bool = False
+    is_certain: bool = True
 
     @property
     def value(self) -> float | None:
@@ -131,6 +133,7 @@ class ShareWindow:
         self._least_period = least_period
         self._polls: deque[_Poll] = deque()
         self._is_pausing: list[bool] = []
+        self._is_steady: list[bool] = []
         self._paced: set[int] = set()
         self._has_clock = False
         self._have_all_come = False
@@ -160,6 +163,7 @@ class ShareWindow:
         fed = tuple([each.fed for each in inputs])
         owed = self._owed(fed, paces, now)
         self._is_pausing = [_is_pausing(pace, now) for pace in paces]
+        self._is_steady = [pace.period is not None for pace in paces]
         self._polls.append(_Poll(now, now if clock is None else clock, sets, fed, owed, taken, gone, thinned))
         while len(self._polls) > 1 and (ns := now - self._polls[1].at) >= SHARE_WINDOW_NS:
             if ns <= _LONGEST and self._since(self._polls[1]).possible < _ENOUGH_TO_TELL:
@@ -224,11 +228,15 @@ class ShareWindow:
         needed = self._enough([allowed - absent for allowed, absent, _ in of_all])
         due = [of_all[index] for index in (needed if self._trigger is None else [self._trigger])]
         possible = min(due)[0]
-        # Of those that limit it about alike, the one whose messages are absent is why.
-        alike = (each for each in due if each[0] <= 1 + (1 + _UNSURE) * possible)
+        # Of those that limit it about alike, the one whose messages are absent is why. Those of others wait for it.
+        waiting = min(absent + last.taken[index] - first.taken[index] for _, absent, index in due)
+        alike = (each for each in due if each[0] <= 1 + (1 + _UNSURE) * max(possible, waiting))
         _, absent, pacemaker = max(alike, key=lambda each: (each[1], -each[0]))
         is_pausing = any(self._is_pausing[index] for _, _, index in due)
-        return Share(left, self._thinned(possible, ns), ns, pacemaker, absent, is_pausing=is_pausing)
+        is_certain = any(self._is_steady[index] for allowed, _, index in due if allowed == possible)
+        return Share(
+            left, self._thinned(possible, ns), ns, pacemaker, absent, is_pausing=is_pausing, is_certain=is_certain
+        )
 
     def _thinned(self, possible: int, ns: int) -> int:
         return min(possible, ns // self._least_period) if self._least_period else possible

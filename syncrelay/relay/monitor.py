@@ -25,7 +25,7 @@ from syncrelay.explain import (
     TryBudget,
 )
 from syncrelay.relay.bindings import GroupBinding
-from syncrelay.relay.ports import Node
+from syncrelay.relay.ports import Node, Purpose
 from syncrelay.relay.surroundings import Surroundings
 from syncrelay.runtime import Runtime
 
@@ -65,12 +65,14 @@ class Monitor:
         node: Node,
         loop: ReceiveLoop,
         surroundings: Surroundings,
+        purpose: Purpose,
         bugs: Bugs,
         runtime: Runtime,
     ) -> None:
         self._node = node
         self._runtime = runtime
         self._loop = loop
+        self._is_look = purpose is Purpose.OBSERVE
         self._bugs = bugs
         self._clock = SimulatedClock(runtime=runtime) if node.is_simulated else None
         self._bindings: Sequence[GroupBinding] = ()
@@ -210,6 +212,7 @@ class Monitor:
             pause=None if binding.group.paused_since is None else Pause(binding.group.paused_since, self._ends_pauses),
             asleep=binding.group.sleeps,
             is_discovering=self._discovery.goes_on(self._runtime.monotonic()),
+            is_look=self._is_look,
             empty_graph=None if all(each.publishers for each in shown) else self._empty_graph,
             inactive=self.inactive,
             lapses=batch.lapses,

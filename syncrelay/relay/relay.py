@@ -116,7 +116,12 @@ class Relay:
             node.declare(config_paths, own_version())
         self._surroundings = Surroundings(node, purpose, runtime=runtime)
         self.monitor = Monitor(
-            node=node, loop=self._loop, surroundings=self._surroundings, bugs=self._bugs, runtime=runtime
+            node=node,
+            loop=self._loop,
+            surroundings=self._surroundings,
+            purpose=purpose,
+            bugs=self._bugs,
+            runtime=runtime,
         )
         manifests = Manifests(
             entities=entities, node=node, backend=backend, loop=self._loop, bugs=self._bugs, runtime=runtime

@@ -67,6 +67,7 @@ def look(draw: Drawn, seconds: float) -> Looked:
             options=draw.rig.options,
             stops=draw.rig.stops,
             publishers=publishers_of(draw.rig.flows),
+            facts=lambda _: {"is_look": True},
             looks=list(_looks(seconds)),
             hears=hears,
         )

@@ -19,7 +19,7 @@ _CURED = 0.98
 # Of faults beside another that was named and then mended: those that are named in time after that.
 _THEN_TOLD = 0.86
 # Of groups that lack sets: those that `observe` and `doctor` do not call healthy.
-_STOPPED = 0.995
+_STOPPED = 0.998
 # Of faults that could be seen by then: those that both name.
 _NAMED = 0.95
 _LOOK_S = 10

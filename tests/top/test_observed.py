@@ -27,7 +27,7 @@ def test_what_decides_against_a_group_is_said_and_counted():
 
 def _looked(hz, *, sends=always, clock=nothing) -> GroupReport:
     rig = Source("/camera", hz, sends=sends, clock=clock), Source("/lidar", hz)
-    told = run(*rig, seconds=10, options={"slop": "20ms"})
+    told = run(*rig, seconds=10, options={"slop": "20ms"}, facts=lambda _: {"is_look": True})
     return GroupReport(told.facts, told.found[-1][1])
 
 
@@ -36,6 +36,15 @@ def test_a_group_of_which_some_of_the_few_possible_sets_left_is_not_called_healt
     assert unhealthy([few], 10) == [
         "front produced 2 of 3 possible sets so far, which is too soon to judge: observe it for longer"
     ]
+
+
+def test_a_group_is_not_called_healthy_where_nothing_shows_how_many_sets_were_possible():
+    (fault,) = unhealthy([_looked(1, sends=lambda second: int(second) in (1, 4, 6))], 10)
+    assert fault == (
+        "front produced 3 sets so far, but too few messages of /camera to tell how many were possible: observe it for"
+        " longer"
+    )
+    assert unhealthy([_looked(1)], 10) == []
 
 
 def test_a_look_goes_on_while_sets_have_just_stopped_and_nothing_says_why():
