@@ -13,20 +13,23 @@ from syncrelay.explain.nearest import quantile, shifted, signed_distances
 _FEWEST: Final = 3
 
 
-def odd_one(facts: GroupFacts) -> int | None:
-    """Return the input whose stamps lie off those of all others, which lie near each other; None if there is none."""
+def who_is_off(facts: GroupFacts) -> str | None:
+    """Say which input lies off all others, which lie near each other, or which two are far apart; None of neither."""
     tolerance, required = facts.tolerance, [index for index, each in enumerate(facts.inputs) if each.required]
     if tolerance is None or len(required) < 3:  # noqa: PLR2004  of two, either may be
         return None
     far = []
-    for one, other in combinations(required, 2):
-        apart = _usually_apart(facts.inputs[one], facts.inputs[other])
-        if apart is None:
+    for pair in combinations(required, 2):
+        distance = _usually_apart(*(facts.inputs[index] for index in pair))
+        if distance is None:
             return None
-        if apart > tolerance.ns:
-            far.append({one, other})
-    odd = set.intersection(*far) if len(far) > 1 else set()
-    return odd.pop() if len(odd) == 1 and len(far) == len(required) - 1 else None
+        if distance > tolerance.ns:
+            far.append(pair)
+    if len(far) == 1:
+        one, other = (facts.inputs[index].name for index in far[0])
+        return f"{one} and {other} are far from each other"
+    odd = set.intersection(*map(set, far)) if len(far) == len(required) - 1 else set()
+    return f"it is {facts.inputs[odd.pop()].name} that is off, the others are near each other" if odd else None
 
 
 def over_tolerances(facts: GroupFacts, index: int | None = None) -> str | None:

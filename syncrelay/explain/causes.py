@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from math import inf
 from typing import Final, NamedTuple
 
-from syncrelay.explain import rules_flow, rules_matching, rules_stamps
+from syncrelay.explain import rules_flow, rules_offset, rules_stamps
 from syncrelay.explain.codes import MATCHING, Code, Of, codes_of
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import SECOND, Finding
@@ -108,7 +108,7 @@ SEEN_SINCE: Final[Mapping[Code, Callable[[GroupFacts], int]]] = {
     Code.DUPLICATES: _faulty_since,
     Code.OVER_SLOP: lambda facts: facts.figures.nearest_from,
     Code.CONSTANT_OFFSET: lambda facts: min(
-        (each.figures.received[-rules_matching.ENOUGH :][0] for each in facts.inputs if each.figures.received),
+        (each.figures.received[-rules_offset.ENOUGH :][0] for each in facts.inputs if each.figures.received),
         default=facts.figures.now,
     ),
     Code.CLOCK_STEP: _first_step,
@@ -165,6 +165,8 @@ def ended(finding: Finding, facts: GroupFacts) -> int:
     now = facts.figures.now
     if finding.code is Code.TOO_SLOW:
         return min(now, rules_flow.stood_still_until(facts) or now)
+    if finding.code is Code.BURSTS:
+        return max((until for at in finding.about for _, until in facts.inputs[at].figures.held_up), default=now)
     reason = _COUNTED.get(finding.code)
     if finding.input is None or reason is None:
         return now

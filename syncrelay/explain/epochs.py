@@ -30,6 +30,8 @@ _MOST_ZONES: Final = 28
 _FROM_BOOT: Final = "count from boot or the start of a simulation, not from 1970"
 # A sensor is as regular as its stamps say if so many of its periods are the same.
 _REGULAR: Final = 0.8
+# ... but for stamps that leapt while the times of receipt did not: so many, as one may be a clock that was set.
+_LEAPS: Final = 2
 # The newest messages are read: those of this long, but no fewer than the first number, and of them about the second.
 # Two show a unit, as no clock runs 1,000 times too fast; any other rate takes more.
 _LATELY: Final = 10 * _SECOND
@@ -120,7 +122,7 @@ def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
     newest = _newest(stamps, delays)
     scatter = _scatter(delays[newest])
     # Coarse stamps scatter by as much as they are rounded.
-    if scatter < _LEAST_SCATTER or scatter < 2 * _unit(stamps):
+    if scatter < _LEAST_SCATTER or scatter < 2 * _unit(stamps[-_ENOUGH:]):
         return None
     last = [(stamp, stamp + delay) for stamp, delay in zip(stamps[newest], delays[newest], strict=True)]
     if len(last) < _SHOW_A_UNIT:
@@ -134,25 +136,37 @@ def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
     return _of_parts(last, scatter) or found
 
 
-def resolution(stamps: Sequence[int]) -> int:
+def resolution(stamps: Sequence[int], delays: Sequence[int]) -> int:
     """Return of which unit all the last stamps are multiples, in nanoseconds: 1 s, 100 or 10 ms; 0 of none of these.
 
     0 too of a sensor that is as regular as that, whose stamps may have been rounded or not, and of one stamp alone.
+    `delays` are the times of receipt minus the stamps.
     """
-    last, unit = stamps[-_ENOUGH:], _unit(stamps)
+    last, unit = stamps[-_ENOUGH:], _unit(stamps[-_ENOUGH:])
     if not unit or len(last) < _FEWEST:
         return 0
-    periods = Counter(map(sub, last[1:], last))
+    steps = list(map(sub, last[1:], last))
+    periods = Counter(steps)
     if periods[0]:
         # No sensor is so regular that it measures twice at a time.
         distinct = set(stamps)
-        return unit if len(distinct) > 1 and not any(stamp % unit for stamp in distinct) else 0
-    return unit if max(periods.values()) <= _REGULAR * len(last) else 0
+        return _unit(tuple(distinct)) if len(distinct) > 1 else 0
+    ((usual, count),) = periods.most_common(1)
+    if count <= _REGULAR * len(last):
+        return unit
+    # Where a message is lost, the next is received as much later as it is stamped. Rounded stamps leap alone.
+    late = delays[-len(last) :]
+    odd = [
+        (step, step + after - before)
+        for step, before, after in zip(steps, late, late[1:], strict=False)
+        if step != usual
+    ]
+    leaps = sum(abs(came - usual) < abs(came - step) for step, came in odd)
+    return unit if leaps >= _LEAPS and 2 * leaps > len(odd) else 0
 
 
 def _unit(stamps: Sequence[int]) -> int:
-    last = stamps[-_ENOUGH:]
-    return next((unit for unit in _RESOLUTIONS if not any(stamp % unit for stamp in last)), 0)
+    return next((unit for unit in _RESOLUTIONS if not any(stamp % unit for stamp in stamps)), 0)
 
 
 def _of_parts(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:

@@ -97,9 +97,14 @@ class InputFigures:
         return self.received[-1] if self.received else None
 
     @property
+    def gaps(self) -> Sequence[int]:
+        """The times between two of the last messages."""
+        return _steps(self.received)
+
+    @property
     def longest_pause(self) -> int:
-        """The longest time between two of the last messages."""
-        return max(_steps(self.received), default=0)
+        """The longest of them."""
+        return max(self.gaps, default=0)
 
     @property
     def delay(self) -> int | None:

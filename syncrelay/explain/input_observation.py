@@ -272,7 +272,7 @@ class InputObservation:
             delays=self._delays[-_LAST_MESSAGES:],
             drift=self._drift,
             reading=misread,
-            resolution=resolution(self._stamps),
+            resolution=resolution(self._stamps, self._delays),
             duplicates=sum(each.duplicates for each in faulty),
             out_of_order=sum(each.out_of_order for each in faulty),
             faulty_looks=len(faulty),

@@ -23,6 +23,7 @@ from syncrelay.explain import (
     rules_flow,
     rules_graph,
     rules_matching,
+    rules_offset,
     rules_stamps,
     rules_transforms,
     words,
@@ -87,7 +88,7 @@ _MATCHING_RULES: Final[tuple[Rule, ...]] = (
     of_each_input(Code.SHORT_QUEUE, rules_matching.short_queue),
     of_each_input(Code.WAITING_FOR_OPTIONAL, rules_matching.waiting_for_optional),
     Rule(Code.NO_TRANSFORM, rules_transforms.no_transform),
-    Rule(Code.CONSTANT_OFFSET, rules_matching.constant_offset),
+    Rule(Code.CONSTANT_OFFSET, rules_offset.constant_offset),
 )
 """What they suggest they try, which costs: they are not asked for what a cause explains."""
 

@@ -56,11 +56,16 @@ def may_drift(facts: GroupFacts) -> bool:
     nearest = facts.figures.nearest_since if facts.is_silent else facts.figures.nearest
     if not nearest.share_over(tolerance.ns) or any(each.figures.resolution > tolerance.ns for each in facts.inputs):
         return False
+    needed = max(_MATTERS * tolerance.ns, nearest.quantile(_USUAL) - tolerance.ns) / watched
+    # A drift moves them all the time.
+    measured_at = facts.figures.nearest_at[-len(nearest) :]
+    moves = needed * (facts.figures.now - measured_at[0]) if measured_at else 0
+    if nearest.quantile(_USUAL) - nearest.quantile(1 - _USUAL) < _MATTERS * moves:
+        return False
     required = [each.figures for each in facts.inputs if each.required]
     young = [each.flows_since or facts.figures.now for each in required if each.drift is None]
     if facts.by_stamp and any(facts.figures.now - since < _YOUNG for since in young):
         return True
-    needed = max(_MATTERS * tolerance.ns, nearest.quantile(_USUAL) - tolerance.ns) / watched
     is_urgent = (facts.silent_for if facts.is_silent else watched) >= _DRIFT_PROVEN_SILENT
     return any(
         abs(each.slope) >= max(needed, each.error) or (not is_urgent and abs(each.slope) + each.error >= needed)

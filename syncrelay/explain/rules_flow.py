@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
+from statistics import median_low
 from typing import Final
 
 from syncrelay.explain import words
@@ -142,7 +143,8 @@ def _overlapped(facts: GroupFacts, inputs: Iterable[Iterable[tuple[int, int]]]) 
 def _pauses(facts: GroupFacts, an_input: InputFacts) -> Iterator[tuple[int, int]]:
     """Yield when an input paused for longer than its rate explains."""
     now, figures = facts.figures.now, an_input.figures
-    longest = _PAUSE_PERIODS * (round(SECOND / figures.usual_hz) if figures.usual_hz else SECOND)
+    usual = round(SECOND / figures.usual_hz) if figures.usual_hz else max(SECOND, median_low(figures.gaps or (0,)))
+    longest = _PAUSE_PERIODS * usual
     yield from ((one, other) for one, other in pairwise(figures.received) if other - one > longest)
     if (last := figures.last_received) is not None and any(
         each.earliest - longest <= last <= each.until < now <= each.until + SENT_AGAIN for each in facts.standstills

@@ -6,21 +6,19 @@ from math import sqrt
 from statistics import median_low
 from typing import Final
 
-import numpy as np
-
 from syncrelay.config import Distance, Tolerance
 from syncrelay.config.units import parse_duration
 from syncrelay.config.wording import all_of
 from syncrelay.explain import words
-from syncrelay.explain.apart import odd_one, over_tolerances
+from syncrelay.explain.apart import over_tolerances, who_is_off
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Fault, Found, absence, counted, nodes, written
-from syncrelay.explain.nearest import quantile, shifted, signed_distances
 from syncrelay.explain.other_stamps import by_offset_of_clock, by_other_stamps, wandering
 from syncrelay.explain.rules_flow import fates
-from syncrelay.explain.rules_stamps import offered_offset, other_clock
+from syncrelay.explain.rules_offset import constant_offset
+from syncrelay.explain.rules_stamps import other_clock
 from syncrelay.explain.standing import Standing
 from syncrelay.explain.trials import REQUIRED, UNTRIED, Trials, Tried, Verdict
 from syncrelay.sync.messages import DropReason
@@ -45,16 +43,7 @@ _UNKNOWN: Final = 2 * SECOND
 # If this share of the possible sets left, no set was missed for what a queue dropped.
 _NEARLY_ALL: Final = 0.95
 _WATCHED: Final = 10 * SECOND
-# Stamps a constant distance apart may pair wrong messages: at least this many, at least this share of a period apart,
-# of rates that differ by no more than this share, scattering by no more than this share of a period, and within this
-# share of a whole number of periods by their times of receipt.
-ENOUGH: Final = 20
-_OFF: Final = 0.15
-_SAME_RATE: Final = 0.05
-_SCATTERS: Final = 0.25
-_WHOLE: Final = 0.1
-_OTHER_CLOCK: Final = SECOND
-# What is missing was not lost one by one where an input paused for this long, and for so many periods.
+# An input has paused where it did not come for this long, and for so many periods.
 _PAUSE: Final = SECOND
 _PAUSE_PERIODS: Final = 5
 # What fills queues before all inputs have come says nothing of their size.
@@ -79,7 +68,7 @@ def over_slop(facts: GroupFacts) -> Found:
     if facts.has_stopped and nearest.share_over(tolerance.ns) > 1 - _MISSED:
         severity = Severity.ERROR if facts.is_silent else Severity.WARN
         text = _too_wide(facts, tolerance, nearest)
-    elif not facts.has_stopped and _is_often_over(facts, tolerance, nearest):
+    elif _is_often_over(facts, tolerance, nearest):
         text, severity = _often_too_wide(facts, tolerance, nearest), Severity.WARN
     else:
         return
@@ -91,9 +80,8 @@ def over_slop(facts: GroupFacts) -> Found:
     if 0 < len(coarse) < len(facts.inputs):
         text += "".join(f"; stamps of {name} are multiples of {words.duration(unit)}" for name, unit in coarse.items())
         check = f"check whether {all_of(coarse)} rounds its stamps"
-    odd = odd_one(facts) if facts.distance is Distance.SPAN else None
-    if odd is not None:
-        text += f"; it is {facts.inputs[odd].name} that is off, the others are near each other"
+    if facts.distance is Distance.SPAN and (off := who_is_off(facts)) is not None:
+        text += f"; {off}"
     yield Fault(text, _advice(facts, found) or check, severity)
 
 
@@ -165,61 +153,6 @@ def _wide_enough(
     return tried._replace(tried=(*tried.tried, *offsets))
 
 
-def constant_offset(facts: GroupFacts) -> Found:
-    """Find an input whose stamps lie a constant distance off, so that messages of different moments are paired.
-
-    Of two inputs of one rate, the messages that are nearest by their stamps come whole periods apart: those that come
-    together were made together. A delay alone does not show here, as it leaves the right stamps near each other.
-    """
-    if not facts.by_stamp or any(map(facts.is_held, range(len(facts.inputs)))) or next(other_clock(facts), None):
-        return
-    first, *others = [index for index, each in enumerate(facts.inputs) if each.required]
-    for other in others:
-        if (off := _whole_periods_off(facts, first, other)) is None:
-            continue
-        # The one that is farther from this machine's time is odd.
-        delays = {index: facts.inputs[index].figures.delay or 0 for index in (first, other)}
-        odd, right = sorted(delays, key=lambda index: -abs(delays[index] - facts.inputs[index].offset))
-        off = off if odd == other else -off
-        name = facts.inputs[odd].name
-        advice = offered_offset(facts, Code.CONSTANT_OFFSET, odd, facts.inputs[odd].offset - off)
-        yield Fault(
-            f"stamps of {name} are always {words.duration(abs(off))} {'ahead of' if off > 0 else 'behind'} those of"
-            f" {facts.inputs[right].name} received at the same time: sets may hold messages of different moments",
-            f"check how {nodes(facts.inputs[odd])} stamps"
-            + (f"; if both are measured at the same time, {advice}" if advice else ""),
-            input=odd,
-        )
-
-
-def _whole_periods_off(facts: GroupFacts, first: int, other: int) -> int | None:
-    """Return how far the stamps of `other` are ahead of those of `first` that come with them, None if all is well."""
-    one, two = facts.inputs[first], facts.inputs[other]
-    if not one.figures.delays or not two.figures.delays or not two.figures.pace_hz:
-        return None
-    later = two.figures.delays[-1] - two.offset - one.figures.delays[-1] + one.offset
-    period = SECOND / two.figures.pace_hz
-    if abs(later) < period / 2 or abs(later) > _OTHER_CLOCK:
-        # As nearly always, and seen without measuring.
-        return None
-    if abs(one.figures.pace_hz * period / SECOND - 1) > _SAME_RATE:
-        return None
-    stamps = (shifted(np.array(each.figures.stamps, dtype=np.int64), each.offset) for each in (one, two))
-    signed = signed_distances(*map(np.sort, stamps))
-    if len(signed) < ENOUGH or quantile(signed, 0.95) - quantile(signed, 0.05) > _SCATTERS * period:
-        return None
-    distance = quantile(signed, 0.5)
-    later = (two.figures.delay or 0) - two.offset - (one.figures.delay or 0) + one.offset
-    apart = distance + later
-    whole = round(apart / period)
-    delay = max((two.figures.delay or 0) - two.offset, (one.figures.delay or 0) - one.offset, key=abs)
-    # Results that take long have the stamps of what they are of. None is stamped before its time.
-    may_be_result = delay > -period / 4 and abs(distance) < _OFF * period
-    if not whole or may_be_result or abs(apart - whole * period) > _WHOLE * period:
-        return None
-    return round(distance - whole * period)
-
-
 def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find messages that overflowed and then were missed."""
     needed = an_input.counts.needed_queue
@@ -232,6 +165,10 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     if not facts.is_silent and missed_hz * _WATCHED <= max(
         2 * SECOND, (1 - _NEARLY_ALL) * facts.possible_hz * _WATCHED
     ):
+        return
+    share = facts.figures.share
+    # What did not come was missed whatever the queue holds, and fills those of the others.
+    if not facts.is_silent and 2 * share.absent > share.possible - share.left > 0:
         return
     if next(other_clock(facts), None):
         return  # what waits for a partner of another clock overflows any queue
@@ -353,12 +290,11 @@ def few_sets(facts: GroupFacts) -> Found:
         return
     share = facts.figures.share
     pacemaker = facts.pacemaker if share.pacemaker is None else facts.inputs[share.pacemaker]
-    pause = pacemaker.figures.longest_pause
     severity = Severity.ERROR if facts.standing is Standing.NONE else Severity.WARN
     left = left_of_possible(facts)
     if 2 * share.absent > share.possible - share.left:
-        is_pause = pause >= _PAUSE and pause * pacemaker.figures.pace_hz > _PAUSE_PERIODS * SECOND
-        why = f"it paused for up to {words.duration(pause)}" if is_pause else "they are lost, or it leaves some out"
+        pause = _longest_pause(pacemaker, share.absent)
+        why = f"it paused for up to {words.duration(pause)}" if pause else "they are lost, or it leaves some out"
         yield Fault(
             f"{left}; {share.absent} of {share.possible} messages of {pacemaker.name} did not come: {why}",
             f"check {nodes(pacemaker)}, and the network to it",
@@ -367,6 +303,19 @@ def few_sets(facts: GroupFacts) -> Found:
         )
         return
     yield Fault(f"{left}; {fates(pacemaker)}", more_sets(facts, Code.FEW_SETS), severity)
+
+
+def _longest_pause(an_input: InputFacts, absent: int) -> int:
+    """Return the longest pause of an input, in nanoseconds, if most of so many absent messages fell into pauses; or 0.
+
+    A pause is as long as several usual periods: messages that are lost one by one seldom leave one.
+    """
+    figures = an_input.figures
+    if figures.longest_pause < _PAUSE:
+        return 0
+    usual = round(SECOND / figures.pace_hz) if figures.pace_hz else median_low(figures.gaps)
+    pauses = [each for each in figures.gaps if each >= max(_PAUSE, _PAUSE_PERIODS * usual)]
+    return max(pauses, default=0) if 2 * sum(each // usual for each in pauses) > absent else 0
 
 
 def is_too_soon(facts: GroupFacts) -> bool:

@@ -45,6 +45,9 @@ class Kind:
 
 KINDS: Final[dict[str, Kind]] = {}
 _BY_SLOP: Final = ("approximate_time", "approximate_time", "approximate_time_eager")
+# A share of sets that is missed in any look, and a share of a unit within which what is cut off stays the same.
+_MANY: Final = 0.25
+_STANDS: Final = 0.25
 _ANY: Final = (*_BY_SLOP, "exact_time", "latest_time")
 
 
@@ -137,12 +140,13 @@ def stamped_late(rig: Rig) -> Truth | None:
     truth = _shift(rig, flow, by, "over_slop constant_offset")
     if truth is None or by > rig.slowest / 2:
         return None
-    # It is as late as it is stamped late: all that shows is how near the stamps are.
-    nearest = round(float(np.median(spans(rig))))
-    # Beside one that comes so often that its messages are near to all, the others have only each other.
+    # It is as late as it is stamped late: all that shows is how near the stamps are, at least, usually and at most.
+    least, nearest, most = np.quantile(spans(rig), [0.02, 0.5, 0.95]).tolist()
+    # Of two, either may be. Beside one that comes so often that its messages are near to all, the others have only
+    # each other.
     slow = [each for each in rig.flows if each is flow or each.period > 2 * by]
-    topics = truth.topics if len(slow) == len(rig.flows) else frozenset(each.topic for each in slow)
-    return replace(truth, topics=topics, sizes=(*truth.sizes, nearest), moments=nearest > 0.8 * by)
+    topics = truth.topics if len(rig.flows) in (2, len(slow)) else frozenset(each.topic for each in slow)
+    return replace(truth, topics=topics, sizes=(*truth.sizes, least, nearest, most), moments=nearest > 0.8 * by)
 
 
 @_kind(policies=_ANY)
@@ -299,12 +303,19 @@ def drift(rig: Rig) -> Truth | None:
 def resolution(rig: Rig) -> Truth | None:
     """Stamps are multiples of 10 ms, 100 ms or 1 s."""
     flow, unit = _one(rig), rig.chance.choice([10, 100, 1000]) * MS
-    flow.stamps = flow.stamps // unit * unit
-    return (
-        _truth("over_slop duplicates", flow, rig.seen(), (unit,))
-        if unit > max(2 * rig.slop, 0.3 * flow.period)
-        else None
-    )
+    exact = flow.stamps
+    flow.stamps = exact // unit * unit
+    if unit <= max(2 * rig.slop, 0.3 * flow.period) or (unit < flow.period and _lost(rig) < _MANY):
+        return None
+    # Two stamps show of what they are multiples.
+    seen = rig.seen(max(0.0, 2 * (unit - flow.period) / S))
+    began = np.searchsorted(flow.true, round(seen * S))
+    cut = (exact - flow.stamps)[: began + 10]
+    if np.ptp(cut) > _STANDS * unit:
+        return _truth("over_slop duplicates", flow, seen, (unit,))
+    # Of a period that is a multiple of the unit, all that shows is that they lie off by what was cut.
+    topics = frozenset(each.topic for each in rig.flows) if len(rig.flows) == 2 else frozenset({flow.topic})
+    return Truth(frozenset({"over_slop"}), topics, seen, (unit, *np.quantile(spans(rig), [0.02, 0.5, 0.95]).tolist()))
 
 
 @_kind(policies=_ANY)
@@ -405,7 +416,10 @@ def pauses(rig: Rig) -> Truth | None:
         return None
     at = (flow.true / S - rig.begin) % every
     flow.keep(~flow.since(rig.begin) | (at < every - pause))
-    return _truth("few_sets", flow, rig.begin + 2 * every, (pause * S,))
+    # What is seen is how long no message came: up to two periods more.
+    gaps = np.diff(flow.true)
+    seen = gaps[gaps > pause * S].tolist()
+    return _truth("few_sets", flow, rig.begin + 2 * every, (pause * S, *seen[:1], max(seen, default=0)))
 
 
 @_kind(midway=0.5)
