@@ -26,13 +26,12 @@ class Effort:
     """The work that one reading of a file has done since its last message, and may still do."""
 
     def __init__(self) -> None:
-        self._room = room_for(0)
-        self._left = 0
-        self._records = 0
+        self.found_message()
+        self._left = LARGEST
 
     def found_message(self) -> None:
         """Start counting from zero again."""
-        self._room = room_for(0)
+        self._room = ALWAYS_FITS
         self._records = 0
 
     def pass_record(self) -> None:
@@ -49,7 +48,7 @@ class Effort:
     @property
     def most(self) -> int:
         """How many bytes of the present chunk or message may still be unpacked."""
-        return max(0, min(self._room, self._left))
+        return min(self._room, self._left)
 
     def require_room(self, size: int) -> None:
         """Raise ValueError if `size` more bytes are too many."""

@@ -44,12 +44,12 @@ class McapFile:
         among = frozenset(wanted)
         chosen = {number: channel if channel in among else None for number, channel in self._by_id.items()}
         index = self._index
-        needed = [each for each in index.segments if is_needed(index.holds.get(each), chosen)]
+        needed = [each for each in index.segments if is_needed(index.holds.get(each, ()), chosen)]
         needed.sort(key=lambda each: each.begin)
         self.position = sum(each.size for each in index.segments) - sum(each.size for each in needed)
         parts = None
         if not self._file.is_near:
-            plain = {each: chunk for each, chunk in index.plain.items() if is_mixed(index.holds.get(each), chosen)}
+            plain = {each: chunk for each, chunk in index.plain.items() if is_mixed(index.holds.get(each, ()), chosen)}
             numbers = [number for number, channel in chosen.items() if channel is not None]
             parts = Parts(self._file, needed, plain, numbers)
         self._effort = Effort()
@@ -61,8 +61,7 @@ class McapFile:
             yield found
         self.position = self.size
         expected = sum(index.counts.get(number, 0) for number, channel in chosen.items() if channel is not None)
-        is_chosen = parts is not None or len(needed) < len(index.segments)
-        if is_chosen and count < expected and said == self.faults:
+        if count < expected and said == self.faults:
             self._losses.say(f"the index finds {count} of the {expected} messages in its statistics")
 
     def close(self) -> None:

@@ -38,8 +38,6 @@ _CHECKSUM_SIZE: Final = 4
 # A DATA_END record holds only a checksum.
 _DATA_END_SIZE: Final = 4
 _TAIL: Final = 32_000
-# No schema or channel record is longer.
-_LONGEST_TEXT: Final = 64_000_000
 # Of a million chunks.
 _LONGEST_SUMMARY: Final = 256_000_000
 
@@ -134,17 +132,9 @@ class McapIndex:
         if expected not in (0, count):
             raise ValueError("chunks are missing in it")
 
-    def _text(self, begin: int, end: int) -> bytes:
-        """Read the content of a record that describes something; raises ValueError if it is too large for that."""
-        if end - begin > _LONGEST_TEXT:
-            raise ValueError(f"{end - begin} bytes are no description")
-        return self._file.read(begin, end - begin)
-
     def _scan(self) -> None:
         """Find channels and segments by going through the file, as far as it can be read."""
-        self.schemas.clear()
-        self.channels.clear()
-        self._effort = Effort()
+        self.schemas, self.channels, self._effort = {}, {}, Effort()
         loose = Pieces()
         place = len(MAGIC)
         try:
@@ -171,37 +161,38 @@ class McapIndex:
         try:
             match opcode:
                 case Opcode.SCHEMA | Opcode.CHANNEL:
-                    self._define(opcode, self._text(begin, end))
+                    self._define(opcode, self._file.read(begin, end - begin))
                 case Opcode.MESSAGE:
                     self._effort.found_message()
                     time = int.from_bytes(self._file.read(begin, min(MESSAGE_FIELDS, end - begin))[6:14], "little")
                     loose.add(Segment(place, end - place, time, time))
                 case Opcode.CHUNK:
-                    self._note_chunk(Segment(place, end - place, 0, 0))
+                    self._note_chunk(begin, end)
         except UNREADABLE as fault:
             self._losses.damaged(f"the {Opcode(opcode).name.lower()} at byte {place}", fault)
 
-    def _note_chunk(self, record: Segment) -> None:
-        chunk = parsed(Chunk, self._file.read(record.offset + RECORD.size, record.size - RECORD.size))
+    def _note_chunk(self, begin: int, end: int) -> None:
+        chunk = parsed(Chunk, self._file.read(begin, end - begin))
         content = unpacked(chunk, self._effort)
-        segment = Segment(record.offset, record.size, chunk.message_start_time, chunk.message_end_time)
+        place = begin - RECORD.size
+        segment = Segment(place, end - place, chunk.message_start_time, chunk.message_end_time)
         self.segments.append(segment)
         self.chunked.add(segment)
         # Damage is reported when the messages are read.
         with suppress(*UNREADABLE):
-            for opcode, begin, end in records(content):
+            for opcode, first, last in records(content):
                 if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                    self._define_in(record, opcode, content[begin:end])
+                    self._define_in(place, opcode, content[first:last])
                 if opcode == Opcode.MESSAGE:
                     self._effort.found_message()
                 else:
                     self._effort.pass_record()
 
-    def _define_in(self, chunk: Segment, opcode: int, content: bytes) -> None:
+    def _define_in(self, chunk: int, opcode: int, content: bytes) -> None:
         try:
             self._define(opcode, content)
         except UNREADABLE as fault:
-            self._losses.damaged(f"a {Opcode(opcode).name.lower()} in the chunk at byte {chunk.offset}", fault)
+            self._losses.damaged(f"a {Opcode(opcode).name.lower()} in the chunk at byte {chunk}", fault)
 
     def _define(self, opcode: int, content: bytes) -> None:
         if opcode == Opcode.SCHEMA:

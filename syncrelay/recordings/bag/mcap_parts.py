@@ -39,19 +39,17 @@ def plain_chunk(index: ChunkIndex) -> PlainChunk | None:
     return PlainChunk(begin, end, end + index.message_index_length) if begin > index.chunk_start_offset else None
 
 
-def is_needed(held: Collection[int] | None, channels: Mapping[int, Channel | None]) -> bool:
+def is_needed(held: Collection[int], channels: Mapping[int, Channel | None]) -> bool:
     """Tell whether a chunk is read: not if a trusted index names only channels that are not wanted.
 
-    `held` are the channel numbers in the index, None if it cannot be trusted; unwanted `channels` are None.
+    `held` are the channel numbers in the index, none if it cannot be trusted; unwanted `channels` are None.
     """
     return not held or any(number not in channels or channels[number] is not None for number in held)
 
 
-def is_mixed(held: Collection[int] | None, channels: Mapping[int, Channel | None]) -> bool:
+def is_mixed(held: Collection[int], channels: Mapping[int, Channel | None]) -> bool:
     """Tell whether a needed chunk also holds channels that are not wanted, all of them known."""
-    return (
-        bool(held) and all(each in channels for each in held or ()) and None in {channels[each] for each in held or ()}
-    )
+    return all(each in channels for each in held) and None in {channels[each] for each in held}
 
 
 class Parts:

@@ -49,8 +49,8 @@ class _Content(BytesIO):
         # Not from getbuffer(), which would copy the content.
         self._size = len(content)
 
-    def read(self, size: int | None = -1, /) -> bytes:
-        if size is not None and size > self._size - self.tell():
+    def read(self, size: int, /) -> bytes:  # type: ignore[override]  # mcap always says how many
+        if size > self._size - self.tell():
             raise EOFError("a length in it points past its end")
         return super().read(size)
 

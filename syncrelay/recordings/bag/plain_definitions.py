@@ -24,6 +24,9 @@ _TOKEN: Final = re.compile(
 _UNBEARABLE: Final = re.compile(r"\(|<<|(?:sequence\s*<\s*){3}")
 _EXPRESSION: Final = re.compile(r'["=@\[|^&+*/%~-]|>>')
 
+# In `sequence<string<7>>` the parser takes the end for a shift.
+_BOUND: Final = re.compile(r"(string\s*<[^<>]*>)(?=>)")
+
 
 def plain_msg(text: str) -> str:
     """Return .msg text without comments and empty lines; raises ValueError if it is too large."""
@@ -48,7 +51,7 @@ def plain_idl(text: str) -> Iterator[str]:
         _require(len(plain) <= _LONGEST and expressions <= _MOST_EXPRESSIONS)
         _require(_UNBEARABLE.search(code) is None)
         if plain:
-            yield plain
+            yield _BOUND.sub(r"\1 ", plain)
 
 
 def _require(is_bearable: bool) -> None:  # noqa: FBT001  as assert's

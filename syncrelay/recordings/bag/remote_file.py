@@ -73,7 +73,7 @@ class RemoteFile:
         """See Source. Spans that are close together become one request."""
         self._windows = list(_windows(spans, self.size))
         self._by_place = sorted((begin, number) for number, (begin, _) in enumerate(self._windows))
-        self._coming.clear()
+        self._coming = {}
 
     def download(self, path: Path) -> None:
         """Write the whole file to a path; raises StorageError, and BagError if there is no space for it."""
@@ -89,8 +89,6 @@ class RemoteFile:
 
     def close(self) -> None:
         """See Source. The connections belong to a file system that others use too."""
-        self._held.clear()
-        self.expect(())
 
     def _look(self) -> Mapping[str, Any]:
         """Return what the store says about the file now."""
@@ -128,12 +126,13 @@ class RemoteFile:
         for each in self._held:
             if each[0] <= place < each[0] + len(each[1]):
                 return each
-        at = bisect_right(self._by_place, (place, len(self._windows))) - 1
-        begin, number = self._by_place[at] if at >= 0 else (0, -1)
-        if number >= 0 and place < begin + self._windows[number][1]:
-            self._held.append((begin, self._planned(number)))
-        else:
-            self._held.append((place, self._fetch(place, min(asked, place + _AT_ONCE))))
+        at = bisect_right(self._by_place, (place, len(self._windows)))
+        if at:
+            begin, number = self._by_place[at - 1]
+            if place < begin + self._windows[number][1]:
+                self._held.append((begin, self._planned(number)))
+                return self._held[-1]
+        self._held.append((place, self._fetch(place, min(asked, place + _AT_ONCE))))
         return self._held[-1]
 
     def _planned(self, number: int) -> bytes:

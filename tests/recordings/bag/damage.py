@@ -25,7 +25,7 @@ Make = Callable[[Path], Path]
 
 
 def mcap(**options) -> Make:
-    return lambda folder: write_mcap(folder / "rig.mcap", FRAMES, **{**_SMALL_CHUNKS, **options})
+    return lambda folder: write_mcap(folder / "rig.mcap", FRAMES, qos=[BEST_EFFORT], **{**_SMALL_CHUNKS, **options})
 
 
 def sqlite(**options) -> Make:

@@ -5,12 +5,13 @@ import socket
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from email.message import Message
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Event, Lock, Thread
 
 
 class FileServer:
-    """Files by path, with their `etags`; `fault` names what is wrong with the answer to request n, from 0.
+    """Files by path, with their `etags` and `dates`; `fault` names what is wrong with the answer to request n, from 0.
 
     `sent` is the number of bytes of content sent so far.
     """
@@ -18,6 +19,7 @@ class FileServer:
     def __init__(self) -> None:
         self.files: dict[str, bytes] = {}
         self.etags: dict[str, str] = {}
+        self.dates: dict[str, str] = {}
         self.has_ranges = True
         self.fault: Callable[[int], str] = lambda _: ""
         self.requests: list[str] = []
@@ -80,7 +82,7 @@ def _answer(request: BaseHTTPRequestHandler, served: FileServer) -> None:
         served.requests.append(f"{request.command} {request.headers.get('Range', '')}".strip())
     if fault == "silent":
         served.ends.wait(60)
-    etag = f'"{served.etags.get(path, "one")}"'
+    etag, date = served.etags.get(path, '"one"'), served.dates.get(path, "Mon, 23 Nov 2026 05:00:00 GMT")
     if fault in ("drop", "silent"):
         _close(request)
     elif fault.isdigit():
@@ -89,14 +91,23 @@ def _answer(request: BaseHTTPRequestHandler, served: FileServer) -> None:
         _say(request, 302, Location=path)
     elif path not in served.files:
         _say(request, 404)
-    elif request.headers.get("If-Match", etag) != etag:
+    elif not _is_as_expected(request.headers, etag, date):
         _say(request, 412)
     else:
-        _send(request, served, served.files[path], fault, etag)
+        about = {"ETag": etag, "Last-Modified": date}
+        _send(request, served, served.files[path], fault, {name: value for name, value in about.items() if value})
 
 
-def _send(request: BaseHTTPRequestHandler, served: FileServer, content: bytes, fault: str, etag: str) -> None:
-    headers = {"ETag": etag, "Last-Modified": "Mon, 23 Nov 2026 05:00:00 GMT"}
+def _is_as_expected(asked: Message, etag: str, date: str) -> bool:
+    """Whether a file is the one that a request expects. A weak tag is never one that is expected (RFC 9110, 13.1.1)."""
+    if "If-Match" in asked:
+        return asked["If-Match"] == etag and not etag.startswith("W/")
+    return asked.get("If-Unmodified-Since", date) == date
+
+
+def _send(
+    request: BaseHTTPRequestHandler, served: FileServer, content: bytes, fault: str, headers: dict[str, str]
+) -> None:
     wanted = re.fullmatch(r"bytes=(\d+)-(\d+)", request.headers.get("Range", ""))
     body, status = content, 200
     if wanted and served.has_ranges and fault != "whole":

@@ -4,12 +4,14 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import yaml
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
+from rosbags.rosbag2.metadata import dump_qos_v9
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from tests.ros.cdr_messages import NS_PER_SECOND, STORE, VECTOR
@@ -55,9 +57,15 @@ def rig_file(name: str = "front", **keys: Any) -> str:
 
 
 def write_mcap(
-    path: Path, frames: Iterable[Frame], *, store: Any = STORE, profile: str = "ros2", **options: Any
+    path: Path,
+    frames: Iterable[Frame],
+    *,
+    store: Any = STORE,
+    profile: str = "ros2",
+    qos: Sequence[Qos] = (),
+    **options: Any,
 ) -> Path:
-    """An MCAP file with the frames in their order; `options` are the writer's."""
+    """An MCAP file with the frames in their order, and with what rosbag2 adds of `qos`; `options` are the writer's."""
     with path.open("wb") as file:
         writer = McapWriter(file, **{"compression": CompressionType.NONE, **options})
         writer.start(profile)
@@ -66,7 +74,9 @@ def write_mcap(
             if frame.topic not in channels:
                 text, _ = store.generate_msgdef(frame.type_name, ros_version=2)
                 schema = writer.register_schema(frame.type_name, "ros2msg", text.encode())
-                channels[frame.topic] = writer.register_channel(frame.topic, "cdr", schema)
+                profiles = yaml.safe_dump(dump_qos_v9(list(qos)))
+                about = {"offered_qos_profiles": profiles, "topic_type_hash": store.hash_rihs01(frame.type_name)}
+                channels[frame.topic] = writer.register_channel(frame.topic, "cdr", schema, about if qos else {})
             writer.add_message(channels[frame.topic], frame.time, frame.payload, frame.time, number + 7)
         writer.finish()
     return path
@@ -96,7 +106,7 @@ def write_rosbag2(
 
 
 def write_ros1(path: Path, frames: Sequence[Frame], *, compression: Any = None, chunk: int = 2000) -> Path:
-    """A ROS 1 bag of the same messages as ROS 1 serializes them, with a `seq` in their headers."""
+    """A ROS 1 bag of the same messages as ROS 1 serializes them, with a `seq` in their headers; /lidar is latched."""
     writer = Ros1Writer(path)
     writer.chunk_threshold = chunk
     if compression is not None:
@@ -105,7 +115,10 @@ def write_ros1(path: Path, frames: Sequence[Frame], *, compression: Any = None, 
         channels = {}
         for number, frame in enumerate(frames):
             if frame.topic not in channels:
-                channels[frame.topic] = writer.add_connection(frame.topic, frame.type_name, typestore=ROS1_STORE)
+                latching = int(frame.topic == "/lidar")
+                channels[frame.topic] = writer.add_connection(
+                    frame.topic, frame.type_name, typestore=ROS1_STORE, callerid="/rig", latching=latching
+                )
             writer.write(channels[frame.topic], frame.time, as_ros1(frame, number))
     return path
 

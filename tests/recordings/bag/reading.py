@@ -1,8 +1,8 @@
 """Recordings as tests read them: all of their messages as frames, or bound to the groups of a file."""
 
+import resource
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,9 +27,11 @@ def read(*words: Path | str, topics: set[str] | None = None) -> Read:
     name = f"{redacted(str(words[0]))}: "
     with closing(open_recording([str(word) for word in words], tell=told.append)) as recording:
         wanted = [each for each in recording.channels if topics is None or each.topic in topics]
-        found = list(chain.from_iterable(recording.batches(wanted)))
-        assert recording.position == recording.size
-        frames = [Frame(each.topic, each.type, time, payload) for each, time, payload in found]
+        frames, positions = [], [0]
+        for batch in recording.batches(wanted):
+            frames += [Frame(each.topic, each.type, time, payload) for each, time, payload in batch]
+            positions.append(recording.position)
+        assert [*positions, recording.size] == sorted([*positions, recording.position])
         return Read(frames, [fault.removeprefix(name) for fault in recording.faults], told)
 
 
@@ -38,3 +40,14 @@ def bound(*words: Path | str, text: str) -> Iterator[tuple[Recording, tuple[Grou
     """Open a recording, with the groups of a file's text as it fills them."""
     with closing(open_recording([str(word) for word in words])) as recording:
         yield recording, bind(load_text(text), recording)
+
+
+@contextmanager
+def full_disk() -> Iterator[None]:
+    """As on a disk whose quota is used up: the system refuses to write more than 1000 bytes of a file."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))

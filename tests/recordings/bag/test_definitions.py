@@ -2,13 +2,17 @@
 
 import random
 import struct
+from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from syncrelay.cdr import LATEST_STAMP
 from syncrelay.config import StampField
 from syncrelay.errors import BagError
-from syncrelay.recordings.bag.definitions import as_ros2, begins_with_header, converter, fields_of
+from syncrelay.recordings.bag.definitions import as_ros2, begins_with_header, converter, fields_of, stamp_fields
 from syncrelay.recordings.bag.payloads import read_ros1_stamp, stamp_reader, value_reader
 from syncrelay.recordings.bag.recording import Channel, Definition, Encoding
 from tests.faults.extent import chosen
@@ -88,6 +92,53 @@ def test_no_number_in_a_definition_is_too_large_for_a_reader():
         assert all(0 < each <= _LONGEST for each in lengths), told
         assert all(each is None or isinstance(each, int) for each in found), told
         assert max(lengths, default=0) < len(payload) or None in found, told
+
+
+_TIME, _LEADING = ("builtin_interfaces/Time", "{0}"), ("std_msgs/Header", "{0}")
+# Types and forms as .msg files have them, each with rosidl's name, and with that of IDL where it is another.
+_TYPES = {
+    "uint8": ("uint8", "uint8"),
+    "char": ("uint8", "uint8"),
+    "byte": ("octet", "octet"),
+    "bool": ("boolean", "boolean"),
+    "float64": ("double", "double"),
+    "string": ("string", "string"),
+    "string<=7": ("string<7>", "string<7>"),
+    _TIME[0]: (_TIME[0], "builtin_interfaces::msg::Time"),
+    _LEADING[0]: (_LEADING[0], "std_msgs::msg::Header"),
+}
+_FORMS = {
+    "{0}": ("{0}", "{0} {1};"),
+    "{0}[]": ("sequence<{0}>", "sequence<{0}> {1};"),
+    "{0}[3]": ("{0}[3]", "{0} {1}[3];"),
+    "{0}[<=4]": ("sequence<{0}, 4>", "sequence<{0}, 4> {1};"),
+}
+
+
+@given(st.lists(st.tuples(st.sampled_from([*_TYPES]), st.sampled_from([*_FORMS])), min_size=1, max_size=6))
+def test_of_a_definition_in_any_format_the_same_is_known(fields):
+    named = [(f"f{number}", *each) for number, each in enumerate(fields)]
+    msg = "".join(f"{form.format(kind)} {name}\n" for name, kind, form in named)
+    idl = _idl("".join(_FORMS[form][1].format(_TYPES[kind][1], name) for name, kind, form in named))
+    theirs = get_typestore(Stores.ROS2_JAZZY)
+    theirs.register(get_types_from_msg(msg.replace("char ", "uint8 ").replace("char[", "uint8["), _TYPE))
+    for form, text in (("ros2msg", msg), ("ros1msg", msg), ("ros2idl", idl)):
+        channel = _channel(text, form=form)
+        found = fields_of(channel)
+        assert found is not None
+        assert found("rig_msgs/Blip") == {name: _FORMS[form][0].format(_TYPES[kind][0]) for name, kind, form in named}
+        assert found("rig_msgs/Other") == {}
+        assert begins_with_header(channel) == (fields[0] == _LEADING)
+        assert stamp_fields(_TYPE, channel.definition) == tuple(name for name, *each in named if tuple(each) == _TIME)
+        definition, hashed = as_ros2(channel)
+        assert definition is not None
+        assert definition.format == (form if form != "ros1msg" else "ros2msg")
+        assert form == "ros1msg" or definition == channel.definition
+        again = fields_of(replace(channel, definition=definition))
+        assert again is not None
+        assert again("rig_msgs/Blip") == found("rig_msgs/Blip")
+        assert hashed == theirs.hash_rihs01(_TYPE) or "char" in msg
+        assert as_ros2(replace(channel, type_hash="as recorded"))[1] == "as recorded"
 
 
 def _idl(fields: str, constants: str = "") -> str:

@@ -4,7 +4,7 @@ import os
 import sqlite3
 import struct
 from collections.abc import Callable, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +12,12 @@ import pytest
 import zstandard
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import ChunkIndex
+from mcap.records import ChunkIndex, Schema
 
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag import open_recording
 from syncrelay.recordings.bag.effort import Effort
+from syncrelay.recordings.bag.mcap_records import parsed
 from syncrelay.recordings.bag.recording import LATEST
 from syncrelay.recordings.bag.unpacking import unlz4, unzstd
 from tests.recordings.bag.bombs import zstd_piecewise
@@ -139,6 +140,13 @@ def test_a_damaged_description_outside_of_chunks_is_said(opcode, tmp_path):
         frame.payload for frame in frames if frame.topic == "/lidar"
     ]
     assert f"the {opcode.name.lower()} at byte" in faults[0]
+
+
+@pytest.mark.parametrize("missing", [0, 1])
+def test_no_length_in_a_record_points_past_its_end(missing):
+    content = b"\1\0" + b"".join(struct.pack("<I", len(each)) + each for each in (b"a/A", b"ros2msg", b"byte b"))
+    with nullcontext() if not missing else pytest.raises(EOFError):
+        assert parsed(Schema, content[: len(content) - missing]).data == b"byte b"
 
 
 def test_a_message_of_no_channel_is_counted(tmp_path):

@@ -6,13 +6,13 @@ import json
 import os
 import random
 import re
-import resource
 import shutil
 import sqlite3
 import struct
 import subprocess
 import sys
 import tempfile
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -21,18 +21,20 @@ import zstandard
 from mcap.writer import IndexType
 from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
+from syncrelay.config.profile import Profile
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag import open_recording
+from syncrelay.recordings.bag.recording import Definition, Encoding
 from tests.recordings.bag.damage import FRAMES, KINDS, mcap, ros1
-from tests.recordings.bag.making import as_ros1, rig, write_mcap, write_ros1, write_rosbag2
-from tests.recordings.bag.reading import read
-from tests.ros.cdr_messages import IMAGE, header, serialize
+from tests.recordings.bag.making import BEST_EFFORT, ROS1_STORE, as_ros1, rig, write_mcap, write_ros1, write_rosbag2
+from tests.recordings.bag.reading import full_disk, read
+from tests.ros.cdr_messages import IMAGE, STORE, VECTOR, header, serialize
 from tests.ros.frames import Frame
 from tests.ros.streams import BEGIN, MS
 
 
 def _rosbag2(**options):
-    return lambda folder: write_rosbag2(folder / "rig", FRAMES, **options)
+    return lambda folder: write_rosbag2(folder / "rig", FRAMES, qos=[BEST_EFFORT], **options)
 
 
 def _packed(make, suffix, pack):
@@ -60,9 +62,13 @@ def _split(make_one, count=3):
 
 
 def _split_sqlite(folder: Path, number: int, frames: list[Frame]) -> None:
-    made = write_rosbag2(folder / f"part{number}", frames)
+    made = write_rosbag2(folder / f"part{number}", frames, qos=[BEST_EFFORT])
     shutil.move(made / f"part{number}.db3", folder / f"rig_{number}.db3")
     shutil.rmtree(made)
+
+
+def _split_mcap(folder: Path, number: int, frames: list[Frame]) -> None:
+    write_mcap(folder / f"rig_{number}.mcap", frames, qos=[BEST_EFFORT])
 
 
 _ALL_KINDS = {
@@ -73,8 +79,9 @@ _ALL_KINDS = {
     "rosbag2 MCAP, chunks compressed": _rosbag2(plugin=StoragePlugin.MCAP, mode=CompressionMode.STORAGE),
     "rosbag2 MCAP, file compressed": _rosbag2(plugin=StoragePlugin.MCAP, mode=CompressionMode.FILE),
     "MCAP without an index, but a summary": mcap(index_types=IndexType.NONE),
+    "MCAP with an index of chunks alone": mcap(index_types=IndexType.CHUNK),
     "MCAP of another profile": mcap(profile=""),
-    "MCAP, split": _split(lambda folder, number, frames: write_mcap(folder / f"rig_{number}.mcap", frames)),
+    "MCAP, split": _split(_split_mcap),
     "MCAP, gzip": _packed(mcap(), ".gz", gzip.compress),
     "MCAP, zstd as a whole": _packed(mcap(), ".zstd", zstandard.compress),
     "ROS 1, .bag.bz2": _packed(ros1(), ".bz2", bz2.compress),
@@ -82,15 +89,42 @@ _ALL_KINDS = {
 }
 
 
-@pytest.mark.parametrize("kind", _ALL_KINDS)
-def test_every_kind_of_recording_gives_the_messages_as_they_were_received(kind, tmp_path):
-    frames, faults, _ = read(_ALL_KINDS[kind](tmp_path))
-    expected = FRAMES
+_ROS2 = Definition("ros2msg", STORE.generate_msgdef(VECTOR, ros_version=2)[0])
+_ROS1 = Definition("ros1msg", ROS1_STORE.generate_msgdef(VECTOR, ros_version=1)[0])
+
+
+_EVER = 2**63 - 1
+
+
+def _described(kind: str) -> set[tuple[object, ...]]:
+    """What the maker of a kind of recording knows of its topics."""
     if kind.startswith("ROS 1"):
-        # ROS 1's headers begin with `seq`; each file of a split bag counts anew.
-        expected = [frame._replace(payload=as_ros1(frame, 0)[4:]) for frame in FRAMES]
-        frames = [frame._replace(payload=frame.payload[4:]) for frame in frames]
-    assert (frames, faults) == (expected, [])
+        latched = {"/camera": (), "/lidar": (Profile(durability="transient_local"),)}
+        return {(topic, VECTOR, Encoding.ROS1, _ROS1, qos, "") for topic, qos in latched.items()}
+    qos = Profile("keep_last", 5, "best_effort", "volatile", _EVER, _EVER, "automatic", _EVER)
+    # rosbags writes no hashes into MCAP files.
+    hashed = "" if kind.startswith("rosbag2 MCAP") else STORE.hash_rihs01(VECTOR)
+    return {(topic, VECTOR, Encoding.CDR, _ROS2, (qos,), hashed) for topic in ("/camera", "/lidar")}
+
+
+@pytest.mark.parametrize("kind", _ALL_KINDS)
+def test_every_kind_of_recording_gives_what_was_recorded_as_it_was_received(kind, tmp_path):
+    path = _ALL_KINDS[kind](tmp_path)
+    for topics in (None, {"/camera"}, set()):
+        frames, faults, _ = read(path, topics=topics)
+        expected = [frame for frame in FRAMES if topics is None or frame.topic in topics]
+        if kind.startswith("ROS 1"):
+            # ROS 1's headers begin with `seq`; each file of a split bag counts anew.
+            expected = [frame._replace(payload=as_ros1(frame, 0)[4:]) for frame in expected]
+            frames = [frame._replace(payload=frame.payload[4:]) for frame in frames]
+        assert (frames, faults) == (expected, [])
+    with closing(open_recording([str(path)])) as recording:
+        assert (recording.begin, recording.end) == (FRAMES[0].time, FRAMES[-1].time)
+        assert len(recording.channels) == 2 * (3 if "split" in kind else 1)
+        assert {
+            (each.topic, each.type, each.encoding, each.definition, each.qos, each.type_hash)
+            for each in recording.channels
+        } == _described(kind)
 
 
 def test_several_recordings_are_read_as_one(tmp_path):
@@ -108,9 +142,32 @@ def test_a_file_that_the_metadata_names_and_that_is_gone_is_said(tmp_path):
     named = [*(f"day/rig_{number}.mcap" for number in range(3)), "day/rig_2.db3"]
     counted = [{"path": path, "message_count": 5} for path in (7, "other.mcap", "rig_2.db3")]
     about = {"relative_file_paths": named, "files": counted}
-    (folder / "metadata.yaml").write_text(json.dumps({"rosbag2_bagfile_information": about}))
-    (fault,) = read(folder).faults
+    (fault,) = read(_with_metadata(folder, {"rosbag2_bagfile_information": about})).faults
     assert fault == "1 of the 4 files that metadata.yaml names is missing, with 5 messages: rig_2.db3"
+
+
+def _with_metadata(folder: Path, about: object) -> Path:
+    (folder / "metadata.yaml").write_text(json.dumps(about))
+    return folder
+
+
+def test_messages_that_the_metadata_counts_and_that_are_missing_are_said(tmp_path):
+    counted = [{"topic_metadata": {"name": "/camera"}, "message_count": 13}]
+    about = {"topics_with_message_count": [*counted, {"topic_metadata": {"name": "/lidar"}, "message_count": 12}]}
+    folder = _with_metadata(_ALL_KINDS["MCAP, split"](tmp_path), {"rosbag2_bagfile_information": about})
+    said = "metadata.yaml counts {} of the topics that were read, found {}"
+    assert read(folder).faults == [f"1 message missing: {said.format(25, 24)}"]
+    assert read(folder, topics={"/camera"}).faults == [f"1 message missing: {said.format(13, 12)}"]
+    assert read(folder, topics={"/lidar"}).faults == []
+    with closing(open_recording([str(folder)])) as recording:
+        # One of the channels of its topic, of which nothing is counted.
+        assert len(list(recording.batches(recording.channels[:1]))) == 1
+        assert recording.faults == []
+
+
+@pytest.mark.parametrize("about", [[1], "text", {}, {"rosbag2_bagfile_information": [1]}], ids=str)
+def test_a_metadata_yaml_that_is_not_of_rosbag2_does_not_matter(about, tmp_path):
+    assert read(_with_metadata(_ALL_KINDS["MCAP, split"](tmp_path), about)) == (FRAMES, [], [])
 
 
 @pytest.mark.parametrize("change", ["never closed", "cut off"])
@@ -166,14 +223,16 @@ def test_a_compressed_file_that_is_cut_off_is_read_as_far_as_it_goes(tmp_path):
     assert any("cut off" in fault for fault in faults)
 
 
-def test_what_a_killed_recorder_left_in_the_write_ahead_log_is_read(tmp_path):
+@pytest.mark.parametrize("killed_with", [100, 1_000_000], ids=["a little", "more than is in the file"])
+def test_what_a_killed_recorder_left_in_the_write_ahead_log_is_read(killed_with, tmp_path):
     made = _rosbag2()(tmp_path) / "rig.db3"
     killed = tmp_path / "killed.db3"
     database = sqlite3.connect(made)
     database.execute("PRAGMA journal_mode=WAL")
     database.execute("PRAGMA wal_autocheckpoint=0")
-    row = database.execute("SELECT topic_id, max(timestamp), data FROM messages").fetchone()
-    database.execute("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", (row[0], row[1] + MS, row[2]))
+    topic, last = database.execute("SELECT topic_id, max(timestamp) FROM messages").fetchone()
+    row = (topic, last + MS, bytes(killed_with))
+    database.execute("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", row)
     database.commit()
     shutil.copy(made, killed)
     shutil.copy(f"{made}-wal", f"{killed}-wal")
@@ -275,11 +334,5 @@ def test_memory_does_not_grow_with_the_recording(write, tmp_path):
 @pytest.mark.parametrize("size", [2000, 50_000], ids=["noticed as it is closed", "noticed as it is written"])
 def test_where_there_is_no_space_to_decompress_a_file_that_is_said(size, tmp_path):
     (tmp_path / "rig.bag.gz").write_bytes(gzip.compress(bytes(size)))
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    # As on a disk whose quota is used up: the system refuses to write on.
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
-    try:
-        with pytest.raises(BagError, match=r"rig\.bag\.gz: no space in .* to decompress it, set TMPDIR"):
-            open_recording([str(tmp_path / "rig.bag.gz")])
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    with full_disk(), pytest.raises(BagError, match=r"rig\.bag\.gz: no space in .* to decompress it, set TMPDIR"):
+        open_recording([str(tmp_path / "rig.bag.gz")])

@@ -11,6 +11,7 @@ from contextlib import closing
 from itertools import chain
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import pytest
 from hypothesis import given
@@ -24,13 +25,13 @@ from syncrelay.cli.completion import COMPLETERS
 from syncrelay.errors import BagError, StorageError, UnavailableError
 from syncrelay.recordings.bag import is_recording, open_recording
 from syncrelay.recordings.bag.remote_file import RemoteFile
-from syncrelay.recordings.bag.storage import find
+from syncrelay.recordings.bag.storage import files_of, find, metadata_of
 from syncrelay.urls import redacted
 from tests.faults.extent import chosen
 from tests.recordings.bag.damage import FRAMES, KINDS, damaged
 from tests.recordings.bag.file_server import FileServer, file_server
 from tests.recordings.bag.making import rig, write_mcap, write_ros1, write_rosbag2
-from tests.recordings.bag.reading import read
+from tests.recordings.bag.reading import full_disk, read
 from tests.ros.frames import Frame
 
 fsspec = pytest.importorskip("fsspec", reason="the extra `fleet` is not installed")
@@ -67,25 +68,27 @@ def served_as(server: FileServer, path: Path, at: str = "/rig.mcap") -> str:
     return server.url(at)
 
 
-# Options of the writer, what is read, the least and greatest share of the file that is fetched, the most requests.
-_FETCHED: dict[str, tuple[Any, ...]] = {
-    "two topics in chunks of many images": ({"chunk_size": 1_000_000}, _SMALL, 0, 0.06, 70),
-    "two topics in chunks of an image each": ({"chunk_size": 50_000}, _SMALL, 0, 0.06, 70),
-    "the index alone": ({}, set(), 0, 0.05, 5),
-    "all of it": ({"chunk_size": 50_000}, None, 1, 1.1, 10),
+# Options of the writer, what is read, how many requests for it, and for how many thousandths of the file.
+_FETCHED: dict[str, tuple[dict[str, Any], set[str] | None, tuple[int, int]]] = {
+    "two topics in chunks of many images": ({"chunk_size": 1_000_000}, _SMALL, (37, 22)),
+    "two topics in chunks of an image each": ({"chunk_size": 50_000}, _SMALL, (65, 22)),
+    "two topics in chunks of a message each": ({"chunk_size": 1}, _SMALL, (35, 23)),
+    "two topics in chunks that are packed": ({"compression": CompressionType.ZSTD}, _SMALL, (5, 1016)),
+    "the images": ({"chunk_size": 50_000}, {"/image"}, (35, 1016)),
+    "the index alone": ({}, set(), (4, 18)),
+    "all of it": ({"chunk_size": 50_000}, None, (5, 1015)),
     # An index that cannot be trusted leaves out nothing.
-    "one topic without a checksum": ({"chunk_size": 50_000, "enable_crcs": False}, {"/camera"}, 0.9, 1.1, 10),
-    "one topic without statistics": ({"chunk_size": 50_000, "use_statistics": False}, {"/camera"}, 0.9, 1.1, 10),
+    "one topic without a checksum": ({"chunk_size": 50_000, "enable_crcs": False}, {"/camera"}, (5, 1015)),
+    "one topic without statistics": ({"chunk_size": 50_000, "use_statistics": False}, {"/camera"}, (5, 1015)),
 }
 
 
 @pytest.mark.parametrize("case", _FETCHED)
 def test_no_more_is_fetched_than_what_is_wanted_and_in_few_requests(case, server, tmp_path):
-    options, topics, least, most, requests = _FETCHED[case]
+    options, topics, fetched = _FETCHED[case]
     path = write_mcap(tmp_path / "rig.mcap", rig_with_images(), **options)
     assert read(served_as(server, path), topics=topics) == read(path, topics=topics)
-    assert least <= server.sent / path.stat().st_size <= most
-    assert len(server.requests) <= requests
+    assert (len(server.requests), round(1000 * server.sent / path.stat().st_size)) == fetched
 
 
 def _with_summary(path: Path, old: bytes, new: bytes) -> None:
@@ -119,11 +122,22 @@ def test_an_index_that_hides_a_channel_is_told_by_the_statistics(server, tmp_pat
         assert bool(near_faults) == (len(near) < 30)
 
 
+def test_statistics_that_count_a_message_more_than_there_is_are_noticed(server, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", rig(30), chunk_size=1)
+    _with_summary(path, struct.pack("<HQ", 1, 30), struct.pack("<HQ", 1, 31))
+    for word in (path, served_as(server, path)):
+        assert read(word).faults == ["the index finds 60 of the 61 messages in its statistics"]
+        assert read(word, topics={"/camera"}).faults == []
+
+
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if "index" not in kind])
 @pytest.mark.long
 def test_whatever_became_of_it_is_read_as_a_file_of_this_machine_is(kind, server, tmp_path):
     path = KINDS[kind](tmp_path)
-    url = server.url("/rig")
+    url = served_as(server, path, "/rig")
+    # Nothing is copied as a whole of what has an index.
+    is_copied = not kind.startswith("MCAP") or "without chunks" in kind
+    assert bool(read(url).told) == is_copied
     for what, content in damaged(path.read_bytes(), places=chosen(short=2, long=20), seed=19):
         path.write_bytes(content)
         server.files["/rig"] = content
@@ -225,16 +239,26 @@ def test_what_no_second_time_can_mend_is_said_at_once(status, why, server):
     assert len(server.requests) == 2
 
 
-@pytest.mark.parametrize("change", ["tag", "gone"])
-def test_a_file_that_is_replaced_while_it_is_read_is_no_recording(change, server, tmp_path):
+@pytest.mark.parametrize("change", ["another", "gone"])
+@pytest.mark.parametrize("tag", ['"one"', 'W/"one"', ""])
+def test_a_file_that_is_replaced_while_it_is_read_is_no_recording(tag, change, server, tmp_path):
+    server.etags["/rig.mcap"] = tag
     url = served_as(server, write_mcap(tmp_path / "rig.mcap", rig_with_images(10)))
     with closing(open_recording([url])) as recording:
-        if change == "tag":
-            server.etags["/rig.mcap"] = "two"
+        if change == "another":
+            server.etags["/rig.mcap"] = tag.replace("one", "two")
+            server.dates["/rig.mcap"] = "Mon, 23 Nov 2026 05:00:01 GMT"
         else:
             server.files["/rig.mcap"] = b""
         with pytest.raises(StorageError, match="was replaced or removed while it was being read"):
             list(recording.batches(recording.channels))
+
+
+@pytest.mark.parametrize("tag", ['W/"one"', ""])
+def test_a_file_of_which_the_server_tells_no_version_is_read(tag, server, tmp_path):
+    server.etags["/rig.mcap"], server.dates["/rig.mcap"] = tag, ""
+    path = write_mcap(tmp_path / "rig.mcap", FRAMES)
+    assert read(served_as(server, path)) == read(path)
 
 
 @pytest.mark.parametrize("fault", ["", "drop", "cut"])
@@ -324,6 +348,41 @@ def test_where_there_is_no_space_for_a_copy_that_is_said(tmp_path):
     vast.size = 2**60
     with pytest.raises(BagError, match=r"cannot be copied to .* bytes, and .* are free, set TMPDIR"):
         vast.download(tmp_path / "rig.bag")
+    with full_disk(), pytest.raises(BagError, match=r"cannot be copied to .*: no space is left, set TMPDIR"):
+        in_memory(bytes(50_000)).download(tmp_path / "rig.bag")
+
+
+# By a word, what is found below a folder or by a pattern, and which files are read of it.
+FOUND = {
+    "": (["day/a_2.mcap", "day/a_10.mcap", "day/rig"], None),
+    "/day/": (["day/a_2.mcap", "day/a_10.mcap", "day/rig"], ["day/a_2.mcap", "day/a_10.mcap"]),
+    "/day/*": (
+        ["day/a_2.mcap", "day/a_10.mcap", "day/rig"],
+        ["day/a_2.mcap", "day/a_10.mcap", "day/notes.txt", "day/rig/rig.db3"],
+    ),
+    "/**/*.mcap": (["day/a_2.mcap", "day/a_10.mcap"], ["day/a_2.mcap", "day/a_10.mcap"]),
+    "/day/rig": (["day/rig"], ["day/rig/rig.db3"]),
+    "/day/rig/metadata.yaml": (["day/rig"], ["day/rig/rig.db3"]),
+    "/day/a_2.mcap": (["day/a_2.mcap"], ["day/a_2.mcap"]),
+    # Whatever its name is: it was named.
+    "/day/notes.txt": (["day/notes.txt"], ["day/notes.txt"]),
+    "/day/*.txt": (None, ["day/notes.txt"]),
+}
+
+
+@pytest.mark.parametrize("word", FOUND)
+def test_recordings_are_found_below_folders_and_by_patterns(word):
+    store = f"memory://{uuid4().hex}"
+    for name in ("day/a_2.mcap", "day/a_10.mcap", "day/notes.txt", "day/rig/rig.db3", "day/rig/metadata.yaml"):
+        fsspec.filesystem("memory").pipe(f"{store}/{name}", b"rig")
+    for look, expected in zip((find, files_of), FOUND[word], strict=True):
+        if expected is None:
+            with pytest.raises(BagError, match="holds no recording"):
+                look(f"{store}{word}")
+        else:
+            assert [each.removeprefix(f"{store.replace('//', '///')}/") for each in look(f"{store}{word}")] == expected
+    has_metadata = word.startswith("/day/rig")
+    assert (metadata_of(f"{store}{word}") is not None) == has_metadata
 
 
 _CONTENT = random.Random(19).randbytes(300_000)

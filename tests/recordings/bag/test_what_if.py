@@ -1,6 +1,7 @@
 """Faults laid over a recording: each does what it says, to the nanosecond, and the same again."""
 
 from contextlib import closing
+from itertools import chain
 
 import pytest
 
@@ -53,6 +54,25 @@ def test_without_a_fault_that_holds_nothing_changes(bag):
 def test_late_messages_come_later_and_behind_what_was_received_meanwhile(bag):
     late = _as_recorded(lambda each: each._replace(time=each.time + 150 * MS) if each.topic == "/lidar" else each)
     assert _read(bag, "late: /lidar 150ms") == sorted(late, key=lambda each: each[1])
+
+
+def test_a_message_is_handed_on_as_soon_as_none_can_come_before_it(tmp_path, monkeypatch):
+    expected = [(each.time + 150 * MS * (each.topic == "/lidar"), each.topic) for each in rig(5000)]
+    came: list[tuple[int, str]] = []
+    with closing(open_recording([str(write_mcap(tmp_path / "rig.mcap", rig(5000)))])) as recording:
+        recorded = list(chain.from_iterable(recording.batches(recording.channels)))
+
+        def batches(_):
+            for at in range(0, len(recorded), 2500):
+                yield recorded[at : at + 2500]
+                assert came == sorted(each for each in expected if each[0] <= recorded[at + 2499][1])
+
+        monkeypatch.setattr(recording, "batches", batches)
+        disturbed = Disturbed(recording, [parse_fault("late: /lidar 150ms")], seed=0)
+        for batch in disturbed.batches(disturbed.channels):
+            came += [(received, channel.topic) for channel, received, _ in batch]
+    assert came == sorted(expected)
+    assert disturbed.end == recording.end + 150 * MS
 
 
 def test_messages_of_a_topic_keep_their_order_when_its_lateness_ends(bag):

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 from rosbags.interfaces import ConnectionExtRosbag2, QosDurability, QosReliability
-from rosbags.rosbag2 import Reader
+from rosbags.rosbag2 import Reader, StoragePlugin
 
 from syncrelay.config.profile import PRESETS
 from syncrelay.errors import OutputError
@@ -70,11 +70,15 @@ def test_types_and_qos_are_recorded(output, tmp_path):
 
 
 def test_a_folder_has_the_metadata_of_rosbag2(tmp_path):
-    written = write(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out")
+    written = write(write_mcap(tmp_path / "rig.mcap", _RIG, qos=[BEST_EFFORT]), tmp_path / "out")
     with Reader(tmp_path / "out") as reader:
-        assert (reader.start_time, reader.end_time) == (written[0].time, written[-1].time + 1)
-        assert {each.topic: each.msgcount for each in reader.connections} == {"/front/camera": 9, "/front/lidar": 9}
+        about = reader.connections[0].ext
+        assert isinstance(about, ConnectionExtRosbag2)
         assert all(each.digest == STORE.hash_rihs01(VECTOR) for each in reader.connections)
+    theirs = write_folder(tmp_path / "theirs", written, plugin=StoragePlugin.MCAP, qos=about.offered_qos_profiles)
+    ours, of_rosbags = ((folder / "metadata.yaml").read_text() for folder in (tmp_path / "out", theirs))
+    of_rosbags = of_rosbags.replace("theirs.mcap", "out_0.mcap").replace("ros_distro: rosbags", "ros_distro: jazzy")
+    assert yaml.safe_load(ours) == yaml.safe_load(of_rosbags)
 
 
 @pytest.mark.parametrize("restamp", ["none", "earliest"])
@@ -91,6 +95,8 @@ def test_outputs_without_a_set_are_there_too(tmp_path):
     assert write(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out", slop="1ms") == []
     with Reader(tmp_path / "out") as reader:
         assert {each.topic for each in reader.connections} == {"/front/camera", "/front/lidar"}
+    about = yaml.safe_load((tmp_path / "out" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert (about["duration"], about["message_count"]) == ({"nanoseconds": 0}, 0)
 
 
 def test_a_manifest_is_written_behind_the_messages_of_its_set(tmp_path):
