@@ -60,7 +60,7 @@ class McapFile:
             count += len(found)
             yield found
         self.position = self.size
-        expected = sum(index.counts.get(number, 0) for number, channel in chosen.items() if channel is not None)
+        expected = sum(held for number, held in index.counts.items() if chosen.get(number) is not None)
         if count < expected and said == self.faults:
             self._losses.say(f"the index finds {count} of the {expected} messages in its statistics")
 

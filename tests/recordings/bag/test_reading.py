@@ -18,12 +18,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import zstandard
+from hypothesis import given
+from hypothesis import strategies as st
 from mcap.writer import IndexType
 from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
 from syncrelay.config.profile import Profile
+from syncrelay.config.wording import all_of, counted
 from syncrelay.errors import BagError
-from syncrelay.recordings.bag import open_recording
+from syncrelay.recordings.bag import open_recording, recording, segments
+from syncrelay.recordings.bag.metadata import parse_metadata
 from syncrelay.recordings.bag.recording import Definition, Encoding
 from tests.recordings.bag.damage import FRAMES, KINDS, mcap, ros1
 from tests.recordings.bag.making import BEST_EFFORT, ROS1_STORE, as_ros1, rig, write_mcap, write_ros1, write_rosbag2
@@ -108,7 +112,10 @@ def _described(kind: str) -> set[tuple[object, ...]]:
 
 
 @pytest.mark.parametrize("kind", _ALL_KINDS)
-def test_every_kind_of_recording_gives_what_was_recorded_as_it_was_received(kind, tmp_path):
+def test_every_kind_of_recording_gives_what_was_recorded_as_it_was_received(kind, tmp_path, monkeypatch):
+    # Several batches, and of several parts.
+    monkeypatch.setattr(recording, "_MESSAGES", 5)
+    monkeypatch.setattr(segments, "PIECE", 500)
     path = _ALL_KINDS[kind](tmp_path)
     for topics in (None, {"/camera"}, set()):
         frames, faults, _ = read(path, topics=topics)
@@ -118,12 +125,12 @@ def test_every_kind_of_recording_gives_what_was_recorded_as_it_was_received(kind
             expected = [frame._replace(payload=as_ros1(frame, 0)[4:]) for frame in expected]
             frames = [frame._replace(payload=frame.payload[4:]) for frame in frames]
         assert (frames, faults) == (expected, [])
-    with closing(open_recording([str(path)])) as recording:
-        assert (recording.begin, recording.end) == (FRAMES[0].time, FRAMES[-1].time)
-        assert len(recording.channels) == 2 * (3 if "split" in kind else 1)
+    with closing(open_recording([str(path)])) as opened:
+        assert (opened.begin, opened.end) == (FRAMES[0].time, FRAMES[-1].time)
+        assert len(opened.channels) == 2 * (3 if "split" in kind else 1)
         assert {
             (each.topic, each.type, each.encoding, each.definition, each.qos, each.type_hash)
-            for each in recording.channels
+            for each in opened.channels
         } == _described(kind)
 
 
@@ -137,13 +144,38 @@ def test_a_folder_may_be_named_by_its_metadata(tmp_path):
     assert read(_rosbag2()(tmp_path) / "metadata.yaml") == (FRAMES, [], [])
 
 
-def test_a_file_that_the_metadata_names_and_that_is_gone_is_said(tmp_path):
-    folder = _ALL_KINDS["MCAP, split"](tmp_path)
-    named = [*(f"day/rig_{number}.mcap" for number in range(3)), "day/rig_2.db3"]
-    counted = [{"path": path, "message_count": 5} for path in (7, "other.mcap", "rig_2.db3")]
-    about = {"relative_file_paths": named, "files": counted}
-    (fault,) = read(_with_metadata(folder, {"rosbag2_bagfile_information": about})).faults
-    assert fault == "1 of the 4 files that metadata.yaml names is missing, with 5 messages: rig_2.db3"
+_COUNTS = st.sampled_from([0, 5, None, -1, "5", True])
+_LISTED = st.dictionaries(st.sampled_from([f"rig_{n}.mcap" for n in range(9)]), _COUNTS, max_size=9)
+
+
+@given(listed=_LISTED, gone=st.sets(st.integers(0, 8)), packed=st.sets(st.integers(0, 8)), others=st.integers(0, 2))
+def test_files_that_the_metadata_names_and_that_are_gone_are_said(listed, gone, packed, others):
+    names, missing = [*listed], [name for name in listed if int(name[4]) in gone]
+    there = [f"{name}.zstd" if int(name[4]) in packed else name for name in names if name not in missing]
+    files = [{"path": f"day/{name}", "message_count": count} for name, count in listed.items()]
+    about = {
+        "relative_file_paths": [*(f"day/{name}" for name in names), 7],
+        "files": [7, {"path": 7, "message_count": 5}, {"path": "other.mcap", "message_count": 5}, *files],
+        "topics_with_message_count": [
+            *(7, {}, {"topic_metadata": 7, "message_count": 5}, {"topic_metadata": {"name": 7}, "message_count": 5}),
+            *({"topic_metadata": {"name": name}, "message_count": count} for name, count in listed.items()),
+        ],
+    }
+    metadata = parse_metadata(json.dumps({"rosbag2_bagfile_information": about}).encode())
+    assert metadata is not None
+    known = {name: count if count in (0, 5) and count is not True else None for name, count in listed.items()}
+    assert metadata.files == known
+    assert metadata.topics == {f"/{name}": count or 0 for name, count in known.items()}
+    said = metadata.missing([*there, *(f"drive_{n}.mcap" for n in range(others))])
+    # As many other files may be the same by other names.
+    assert bool(said) == (others < len(missing))
+    if said:
+        counts = [known[name] for name in missing]
+        held = "" if None in counts else f", with {counted(sum(filter(None, counts)), 'message')}"
+        are = "is" if len(missing) == 1 else "are"
+        shown = all_of([*missing[:5], *([f"{len(missing) - 5} more"] if len(missing) > 5 else [])])
+        of = f"{len(missing)} of the {len(names)} files that metadata.yaml names"
+        assert said == f"{of} {are} missing{held}: {shown}"
 
 
 def _with_metadata(folder: Path, about: object) -> Path:
@@ -159,10 +191,10 @@ def test_messages_that_the_metadata_counts_and_that_are_missing_are_said(tmp_pat
     assert read(folder).faults == [f"1 message missing: {said.format(25, 24)}"]
     assert read(folder, topics={"/camera"}).faults == [f"1 message missing: {said.format(13, 12)}"]
     assert read(folder, topics={"/lidar"}).faults == []
-    with closing(open_recording([str(folder)])) as recording:
+    with closing(open_recording([str(folder)])) as opened:
         # One of the channels of its topic, of which nothing is counted.
-        assert len(list(recording.batches(recording.channels[:1]))) == 1
-        assert recording.faults == []
+        assert len(list(opened.batches(opened.channels[:1]))) == 1
+        assert opened.faults == []
 
 
 @pytest.mark.parametrize("about", [[1], "text", {}, {"rosbag2_bagfile_information": [1]}], ids=str)
@@ -309,7 +341,8 @@ def test_a_name_that_is_not_there_gets_the_nearest(tmp_path):
 
 _PEAK = """
 import resource, sys
-from syncrelay.recordings.bag import open_recording
+from syncrelay.recordings.bag import open_recording, recording, segments
+from syncrelay.recordings.bag.metadata import parse_metadata
 for name in sys.argv[1:]:
     recording = open_recording([name])
     for _ in recording.batches(recording.channels):
