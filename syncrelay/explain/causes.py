@@ -77,6 +77,7 @@ EXPLAINS: Final[Mapping[Code, Explained]] = {
     ),
     Code.OUT_OF_ORDER: Explained(frozenset({Code.OVER_SLOP, Code.FEW_SETS, Code.UNEXPLAINED})),
     Code.DUPLICATES: Explained(frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET, Code.FEW_SETS, Code.UNEXPLAINED})),
+    Code.OVER_SLOP: Explained(frozenset({Code.FEW_SETS, Code.UNEXPLAINED})),
 }
 """Causes, and which other findings they explain. No chain of explanations comes back to where it began."""
 

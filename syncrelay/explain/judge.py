@@ -123,6 +123,8 @@ class Judge:
         if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
             found += [_unexplained(facts)] if facts.had_time and not rules_matching.is_too_soon(facts) else []
         said = self._unexplained_by_others(found, facts) if found and self._causes else tuple(found)
+        # What is mended of the file or of stamps has cost sets that are missing from the share for a while.
+        self._keep((each for each in said if each.code in MATCHING), facts)
         for each in said:
             cause = self._causes.get((each.code, each.input))
             if cause is not None and cause.at == facts.figures.now:
@@ -176,11 +178,15 @@ class Judge:
                 for key, cause in self._causes.items()
                 for about in [cause.finding.about if cause.finding.code in OF_CLOCKS else ()]
             }
+        self._keep(found, facts)
+
+    def _keep(self, found: Iterable[Finding], facts: GroupFacts) -> None:
+        """Note that these causes hold now."""
         for finding in found:
             if finding.explains and finding.code in EXPLAINS:
                 self._causes[finding.code, finding.input] = Cause(
                     finding,
-                    now,
+                    facts.figures.now,
                     ended(finding, facts),
                     most_missed(finding, facts),
                     is_aside=is_aside(finding, facts),
@@ -234,7 +240,7 @@ class Judge:
         (few,) = _FEW_SETS.findings(facts)
         over = [each for each in self._causes.values() if each.was_said and self._explains(each, few, facts)]
         if over:
-            cause = max(over, key=lambda each: each.at)
+            cause = max(over, key=lambda each: each.ended)
             until = f"until {words.seconds(facts.figures.now - cause.ended)} ago, {cause.finding.text}"
             text = f"{rules_matching.left_of_possible(facts)}; {until}"
             few = replace(cause.finding, severity=least, text=text, suggestion=None, is_over=True)
@@ -266,7 +272,7 @@ class Judge:
         explained, about = EXPLAINS[cause.finding.code], cause.finding.input
         if finding.code not in explained.in_group and finding.code not in explained.of_input:
             return False
-        is_narrow = finding.code not in explained.in_group or cause.is_aside
+        is_narrow = finding.code not in explained.in_group or cause.is_aside or _is_of_own_stamps(finding, facts)
         if is_narrow and about is not None and about != finding.input:
             return False
         since = seen_since(finding.code, facts)
@@ -295,6 +301,12 @@ class Judge:
         since = max(ends) + SETTLES
         share = facts.figures.shares(since).value
         return since if share is not None and share < FEW else None
+
+
+def _is_of_own_stamps(finding: Finding, facts: GroupFacts) -> bool:
+    """Whether the stamps of an input alone show what is found, and not how they compare with those of others."""
+    about = finding.input
+    return finding.code is Code.OTHER_CLOCK and about is not None and facts.inputs[about].figures.reading is not None
 
 
 def _is_why(finding: Finding) -> bool:

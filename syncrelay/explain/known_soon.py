@@ -18,8 +18,15 @@ _YOUNG: Final = 1_200_000_000
 
 
 def _is_young(an_input: InputFacts) -> bool:
-    received = an_input.figures.received
-    return bool(received) and (len(received) < _FEWEST or received[-1] - received[0] < _YOUNG)
+    figures, received = an_input.figures, an_input.figures.received
+    if not received:
+        return False
+    # Of a fast input, as many messages as are kept span less than that however long they have come. There are fewer
+    # stamps where they were not set, or were of another clock, before.
+    since = min(received[0], figures.flows_since or received[0])
+    if 0 < len(figures.stamps) < len(received):
+        since = figures.stamps[0] + figures.delays[0]
+    return len(received) < _FEWEST or received[-1] - since < _YOUNG
 
 
 def known_soon(facts: GroupFacts, code: Code) -> str:

@@ -99,10 +99,10 @@ def steady_period(times: Sequence[int]) -> float | None:
     if most > len(off):
         return None
     # One of them is what the others are measured by.
-    return base if _chance(most - 1, len(periods) - 1, 2 * max(off[most - 1], _NEAR)) < _BY_CHANCE else None
+    return base if chance(most - 1, len(periods) - 1, 2 * max(off[most - 1], _NEAR)) < _BY_CHANCE else None
 
 
-def _chance(least: int, of: int, share: float) -> float:
+def chance(least: int, of: int, share: float) -> float:
     """Return how likely it is that of so many, each of which is so likely, at least so many are."""
     if share >= 1:
         return 1.0

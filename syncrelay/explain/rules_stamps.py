@@ -270,7 +270,7 @@ def clock_step(facts: GroupFacts) -> Found:
     if not facts.by_stamp:
         return
     steps = {index: step for index, each in enumerate(facts.inputs) if (step := each.figures.stepped)}
-    if 1 < len(steps) == len(facts.inputs) and _is_one_step(steps.values()):
+    if 1 < len(steps) == len(facts.inputs) and _is_one_step(facts, steps.values()):
         # All that changes by less may be the way to us, and a recording that is looped is no clock that was set back.
         last = max(steps.values())
         if (-_LOOPED < last.by <= -STEP_NS or last.by >= STEP_NS) and is_told(facts, last):
@@ -308,8 +308,12 @@ def is_told(facts: GroupFacts, step: Step) -> bool:
     return abs(step.by) >= enough and 0 <= facts.figures.now - step.at < _TOLD_JUMP
 
 
-def _is_one_step(steps: Iterable[Step]) -> bool:
-    by = [step.by for step in steps]
+def _is_one_step(facts: GroupFacts, steps: Iterable[Step]) -> bool:
+    at, by = [step.at for step in steps], [step.by for step in steps]
+    # Of a slow input, it is the next message that shows it.
+    slowest = min((each.figures.usual_hz for each in facts.inputs if each.figures.usual_hz), default=0.0)
+    if max(at) - min(at) > _LOOK + (2 * SECOND / slowest if slowest else 0):
+        return False
     return max(by) - min(by) < max(_STEPPED_ALIKE * max(map(abs, by)), SECOND // 20)
 
 

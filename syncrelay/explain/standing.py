@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final, NamedTuple, TypeAlias
 
+from syncrelay.explain.rhythm import chance
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
 
@@ -24,6 +25,8 @@ BACK: Final = 0.95
 """The share at which few sets are enough again."""
 # A silence ends at this share: a single stray set in 5 s is at most a third of the possible ones.
 _AGAIN: Final = 0.5
+# Of few possible sets, as many are missing by chance, of a group that gives enough, in less than this share of cases.
+_BY_CHANCE: Final = 0.005
 # The pace of a steady input is measured this precisely: a smaller share of missing messages is not counted.
 _UNSURE: Final = 0.05
 # An input pauses if nothing came for more than a second and for more periods than this.
@@ -274,8 +277,17 @@ class StandingWatch:
         if is_silent:
             self.now = Standing.NONE
         elif value is not None and not (share.is_pausing and self.now is Standing.ENOUGH):
-            if value >= BACK or (value >= FEW and self.now is Standing.ENOUGH):
+            # A silence says nothing of what leaves after it: of a slow group, two sets that are missing are one.
+            if value >= BACK or (self.now is not Standing.FEW and not _are_few(share)):
                 self.now = Standing.ENOUGH
             elif self.now is Standing.ENOUGH or value >= _AGAIN:
                 self.now = Standing.FEW
         return self.now
+
+
+def _are_few(share: Share) -> bool:
+    """Whether so few sets left that it is no chance: of those that are enough again, so many may be missing."""
+    if share.left >= FEW * share.possible:
+        return False
+    missing = share.possible - share.left
+    return share.possible >= _ENOUGH_TO_TELL or chance(missing, share.possible, 1 - BACK) < _BY_CHANCE

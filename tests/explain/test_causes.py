@@ -19,6 +19,8 @@ from syncrelay.explain import (
 from syncrelay.explain.causes import EXPLAINS, explained_by
 from syncrelay.explain.clocks import Drift
 from syncrelay.explain.distribution import Distribution
+from syncrelay.explain.epochs import Reading
+from syncrelay.explain.known_soon import known_soon
 from syncrelay.sync.messages import DropReason
 from tests.explain.support.cases import LIDAR, QUIET, camera, dropped, overflowing, wide
 from tests.explain.support.groups import MS, NOW, S, a_group, a_silent_group, an_input
@@ -106,6 +108,51 @@ def test_a_cause_that_is_over_does_not_explain_that_few_sets_leave_now():
     assert codes(a_judge.judge(a_group(figures=later))) == []
     few = {**later, "share": Share(5, 100, 10 * S)}
     assert codes(a_judge.judge(a_group(figures=few, standing=Standing.FEW))) == [Code.OVER_SLOP]
+
+
+def test_sets_that_were_too_wide_until_now_are_why_they_are_missing():
+    a_judge, half = Judge(), {"share": Share(50, 100, 10 * S)}
+    (wide_now,) = a_judge.judge(a_group(figures={**WIDE, **half}, standing=Standing.FEW))
+    (after,) = a_judge.judge(a_group(figures={**half, "now": NOW + 2 * S}, standing=Standing.FEW))
+    assert (after.code, after.is_over) == (Code.OVER_SLOP, True)
+    assert after.text == f"50 of 100 possible sets left in the last 10 s; until 2 s ago, {wide_now.text}"
+    missing = {**half, "now": NOW + 4 * S, "shares": lambda _: Share(10, 20, 3 * S)}
+    assert codes(a_judge.judge(a_group(figures=missing, standing=Standing.FEW))) == [Code.FEW_SETS]
+
+
+def test_of_two_causes_that_are_over_the_one_that_ended_last_is_why_sets_are_missing():
+    a_judge, half = Judge(), {"share": Share(50, 100, 10 * S)}
+    stood = {"waited": 3 * S, "standstills": (Standstill(NOW - 4 * S, 3 * S),)}
+    slowed = camera(figures=SLOWED)
+    a_judge.judge(a_group(slowed, LIDAR, figures=half, standing=Standing.FEW))
+    a_judge.judge(a_group(figures={**half, "now": NOW + S}, standing=Standing.FEW, **stood))
+    (after,) = a_judge.judge(a_group(figures={**half, "now": NOW + 2 * S}, standing=Standing.FEW))
+    assert (after.code, after.is_over) == (Code.SLOWED, True)
+
+
+def test_what_the_stamps_of_an_input_show_is_not_explained_by_those_of_another():
+    two = Endpoint("/a", "sensor_msgs/msg/Image"), Endpoint("/b", "sensor_msgs/msg/Image")
+    both = camera(publishers=two, figures={"swings": 2, "swung_by": 3 * S})
+    misread = an_input("/lidar", figures={"reading": Reading("are milliseconds", 1e-6, is_unit=True), "stamps": (1, 2)})
+    assert codes(judge(a_group(both, misread))) == [Code.SEVERAL_PUBLISHERS, Code.OTHER_CLOCK]
+
+
+def test_steps_at_different_times_are_not_one_of_all_inputs():
+    def stepped(ago):
+        steps = (Step(NOW - ago, 3 * S), Step(NOW - S, 3 * S))
+        inputs = [an_input(name, figures={"stepped": step}) for name, step in zip("ab", steps, strict=True)]
+        return [each.inputs or each.input for each in judge(a_group(*inputs)) if each.code is Code.CLOCK_STEP]
+
+    assert stepped(2 * S) == [None]
+    assert stepped(9 * S) == [0, 1]
+
+
+def test_the_unit_of_a_fast_input_that_has_come_for_long_is_known():
+    fast = {"received": tuple(NOW - 4 * MS * n for n in range(200, 0, -1)), "rate_hz": 250.0}
+    group = a_group(camera(figures=fast), an_input("/lidar", figures=fast))
+    assert known_soon(group, Code.OTHER_CLOCK) == ""
+    began = a_group(camera(figures={**fast, "flows_since": NOW - 800 * MS}), an_input("/lidar", figures=fast))
+    assert "another unit or rate" in known_soon(began, Code.OTHER_CLOCK)
 
 
 def test_a_cause_explains_a_step_for_as_long_as_the_step_is_told():

@@ -193,7 +193,7 @@ def still_too_wide(left: int) -> bool:
         assert len(a_judge.judge(a_group(figures=half, standing=Standing.FEW))) == 1
     hardly = {**spans(3, 100), "share": Share(left, 100, 10 * S)}
     found = a_judge.judge(a_group(figures=hardly, standing=Standing.FEW))
-    return Code.OVER_SLOP in {each.code for each in found}
+    return Code.OVER_SLOP in {each.code for each in found if not each.is_over}
 
 
 def says(*seconds: int, groups: int = 1, recovers: bool = False) -> list[int]:
@@ -219,10 +219,10 @@ def warns(*seconds: int, severity: Severity = Severity.WARN, away: tuple[int, ..
     return lines
 
 
-def stands(left: int, before: Standing = Standing.ENOUGH) -> Standing:
+def stands(left: int, before: Standing = Standing.ENOUGH, of: int = 100) -> Standing:
     watch = StandingWatch()
     watch.now = before
-    return watch.follow(Share(left, 100, 10 * S), is_silent=False)
+    return watch.follow(Share(left, of, 10 * S), is_silent=False)
 
 
 def flows_anew(pause: int, period: int = S // 10) -> bool:
@@ -356,7 +356,10 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     # How a group stands, by the percent of its sets that leave.
     "few": (100, 0, 79, lambda n: stands(n) is Standing.FEW),
     "enough again": (0, 100, 95, lambda n: stands(n, Standing.FEW) is Standing.ENOUGH),
-    "not none any more": (0, 94, 50, lambda n: stands(n, Standing.NONE) is Standing.FEW),
+    "not none any more": (0, 79, 50, lambda n: stands(n, Standing.NONE) is Standing.FEW),
+    "enough after a silence": (0, 100, 80, lambda n: stands(n, Standing.NONE) is Standing.ENOUGH),
+    "few of 10": (10, 5, 6, lambda n: stands(n, of=10) is Standing.FEW),
+    "few of 14": (14, 5, 10, lambda n: stands(n, of=14) is Standing.FEW),
     "possible sets to tell": (0, 99, 10, lambda n: Share(0, n, 10 * S).value is not None),
     # The log.
     "a warning lasts": (0, 60 * S, 5 * S, lambda by: warns(0, by) == [by]),
