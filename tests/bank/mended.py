@@ -8,8 +8,8 @@ import numpy as np
 
 from syncrelay.explain import Code, Finding, GroupFacts, Severity, explanation
 from tests.bank.kinds import Truth
-from tests.bank.play import IN_TIME_S, Drawn, Result, Score, fit, heard, is_of_rig
-from tests.bank.rig import LONGEST_S, Flow, Rig, S
+from tests.bank.play import IN_TIME_S, MIDWAY_S, Drawn, Result, Score, fit, heard, is_of_rig
+from tests.bank.rig import LONGEST_S, Flow, Rig, S, spans
 
 # What is mended in the file begins anew, as a draw with the other fault alone.
 _OF_FILE: Final = frozenset({"narrow_slop", "low_max_age", "short_queue", "optional_away"})
@@ -89,13 +89,21 @@ def mended(draw: Drawn, result: Result) -> Mended | None:
 def _truth_after(draw: Drawn, named: int, at: float) -> Truth | None:
     """Return what is true of the other fault once one is mended; None where it is over, or cannot be seen then."""
     (rig, truth), other = draw.alone[1 - named], draw.kinds[1 - named]
-    if rig.begin >= at:
+    # What changes is drawn so late that it is known what was before: here, since the first fault is mended.
+    was_known = other not in _CHANGES or not truth.topics & draw.truths[named].topics
+    if rig.begin >= at + (0 if was_known else MIDWAY_S[0] + 8 * rig.slowest / S):
         return truth
-    if other in _EVENTS or (other in _CHANGES and truth.topics & draw.truths[named].topics):
+    if not was_known or other in _EVENTS or (other in _STEPS and not _shows(rig)):
         return None
     takes = truth.seen - (rig.begin or rig.starts)
     codes = truth.codes | _OFF if other in _STEPS else truth.codes
     return replace(truth, codes=codes, seen=max(truth.seen, at + takes))
+
+
+def _shows(rig: Rig) -> bool:
+    """Whether stamps that were set are too far from the others' from then on, and not as near to other messages."""
+    after = spans(rig, [replace(each, stamps=each.stamps[each.since(rig.begin)]) for each in rig.flows])
+    return not len(after) or float(np.mean(after > rig.slop)) > 0.95
 
 
 def _mended_at(both: Rig, alone: Rig, at: float) -> Rig:

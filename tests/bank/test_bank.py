@@ -17,7 +17,7 @@ _WELL = 0.99
 # Most that fail are offsets and slops for stamps that are near half a period off: which of two partners is right?
 _CURED = 0.98
 # Of faults beside another that was named and then mended: those that are named in time after that.
-_THEN_TOLD = 0.86
+_THEN_TOLD = 0.9
 # Of groups that lack sets: those that `observe` and `doctor` do not call healthy.
 _STOPPED = 0.998
 # Of faults that could be seen by then: those that both name.
