@@ -47,7 +47,7 @@ class Reporters:
             self._wanted[DIAGNOSTICS] = lambda: Diagnostics(self._node, self._entities, now=self._now)
             if asked.scalars:
                 self._wanted |= {group: partial(Scalars, self._entities, group) for group in groups}
-        for key in self._reporters.keys() - self._wanted.keys():
+        for key in [key for key in self._reporters if key not in self._wanted]:
             self._reporters.pop(key).close()
         self._make()
 

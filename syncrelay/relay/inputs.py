@@ -179,7 +179,7 @@ class TopicInput:
             output.find_handler(self._message_type)
             if output.not_readable:
                 self._once.log(logging.ERROR, f"{output.group.config.name}: {self.name}: {output.not_readable}")
-        if self.outputs.source is not None and any(output.handler for output in lacking):
+        if self.outputs.source is not None:
             self._loop.call(self.outputs.feed).result()
         return None
 
@@ -308,7 +308,7 @@ class TopicInput:
 
     def _fail(self, error: Exception) -> None:
         """Note that the source gives no more messages. On the loop's thread."""
-        self.outputs.source, self._failure, self._force_poll = None, error, True
+        self.outputs.source, self._failure = None, error
 
 
 @dataclass(frozen=True, slots=True, eq=False)

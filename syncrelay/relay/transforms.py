@@ -72,8 +72,9 @@ class TransformListener:
             if self._message_type is None or topic in self._failed:
                 self._leave(topic)
         if self._message_type is not None and self._runtime.monotonic() >= self._try_again:
-            for topic in _PROFILES.keys() - self._entered.keys():
-                self._enter(topic)
+            for topic in _PROFILES:
+                if topic not in self._entered:
+                    self._enter(topic)
 
     def _enter(self, topic: str) -> None:
         try:

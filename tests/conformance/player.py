@@ -22,8 +22,9 @@ from syncrelay.explain.judge import explanation
 from syncrelay.relay.listening import Heard, Listener
 from syncrelay.relay.ports import EndpointInfo, Purpose
 from syncrelay.relay.relay import Relay
+from syncrelay.status import status_of
 from tests.conformance.script import PAIR, VECTOR, Script
-from tests.conformance.seen import MS, Seen, by_reason, endpoint, message, without_figures
+from tests.conformance.seen import MS, Seen, by_reason, endpoint, message, short_of, without_figures
 from tests.conformance.world import Reader, World, Writer
 from tests.ros.cdr_messages import vector
 from tests.ros.transforms import transforms
@@ -51,14 +52,18 @@ class _Running(Running):
 class Recorder(logging.Handler):
     """The relay's log."""
 
-    def __init__(self) -> None:
+    def __init__(self, monotonic: Callable[[], float]) -> None:
         super().__init__(logging.INFO)
+        self._monotonic, self._began = monotonic, monotonic()
         self.texts: list[str] = []
+        self.lines: list[tuple[float, str]] = []
+        """When each line came, in seconds from the begin."""
         self.warnings: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
         text = record.getMessage() + (f"\n{record.exc_info[1]!r}" if record.exc_info else "")
         self.texts.append(text)
+        self.lines.append((self._monotonic() - self._began, text))
         if record.levelno >= logging.WARNING:
             self.warnings.append(text)
 
@@ -160,7 +165,9 @@ class Player:
             began = runtime.monotonic()
             with Relay(config, node, backend, purpose=purpose, runtime=runtime) as relay:
                 reports = relay.look(seconds)
-            self._note("looked for as long as asked", runtime.monotonic() - began >= seconds)
+            took = runtime.monotonic() - began
+            self._note("looked for as long as asked", took >= seconds)
+            self.seen.inside.append(f"looked for {took:.1f} s")
             self._observed.append(reports)
 
         self._world.runtime.start("observe", look)
@@ -416,6 +423,8 @@ class Player:
 
     def stop(self) -> None:
         """The relay gets SIGTERM, and ends."""
+        self._reports()
+        self.seen.inside.append(short_of(status_of(self._relay.state()).as_dict()))
         running, self._running = self._require, None
         running.end()
         self._until(lambda: running.has_ended, "the end of the relay")
@@ -438,6 +447,9 @@ class Player:
             self.stop()
         for name in self._readers:
             self._taken(name)
+        log = [f"{at:.1f} {text.splitlines()[0]}" for at, text in self._recorder.lines]
+        self.seen.inside += [" | ".join(log), ", ".join(self._world.made), ", ".join(self._world.left)]
+        self.seen.inside = [each.replace(str(self._folder), "FOLDER") for each in self.seen.inside]
         self.seen.log = sorted({self._blank(each) for each in self._recorder.warnings if not _BY_CHANCE.search(each)})
         return self.seen
 
@@ -484,7 +496,7 @@ class Player:
         node = self._relay.node
         topics = self._relay._groups.bindings.topics  # noqa: SLF001
         found = [output for topic in topics for output in topic.outputs.all]
-        outputs = {node.resolve_topic(each.topic): each.publisher for each in found}
+        outputs = {node.resolve_topic(each.topic): each.publisher or each.bundle.publisher for each in found}
         publisher = outputs.get(name)
         return name not in outputs or (publisher is not None and publisher.is_heard())
 
@@ -514,7 +526,7 @@ class Player:
 
 def play(script: Script, world: World, folder: Path) -> Seen:
     """Play a script in a ROS."""
-    recorder, level = Recorder(), _LOG.level
+    recorder, level = Recorder(world.runtime.monotonic), _LOG.level
     _LOG.addHandler(recorder)
     _LOG.setLevel(logging.INFO)
     player = Player(world, folder, recorder)

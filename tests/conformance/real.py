@@ -89,6 +89,8 @@ class _Reader:
 class RealWorld:
     """A domain, for one script after another."""
 
+    made = left = ()
+
     def __init__(self, domain: int, folder: Path, environment: Mapping[str, str]) -> None:
         self.runtime = SYSTEM
         self._domain, self._folder, self._environment = domain, folder, environment

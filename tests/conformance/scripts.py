@@ -6,7 +6,10 @@ from tests.conformance.script import (
     ARRAY,
     BOOL,
     CLOCK,
+    COLOR,
     FLOAT,
+    IMAGE,
+    MARKER,
     PAIR,
     POINT,
     REFERENCE,
@@ -230,7 +233,7 @@ _GRAPH: Final = (
     short("a topic that the relay's own process holds with another type is refused",
         _SENSORS, do.relay(PAIR, node={"lifecycle": True}), do.hold("/front/a", POINT),
         do.transit("configure", "activate"), do.finding("refused_by_dds", wordless=True),
-        do.settled(), do.endpoints("/front/a", publishers=1), do.endpoints("/front/b", publishers=1)),
+        do.settled(), do.endpoints("/front/a", publishers=1), do.endpoints("/front/b", publishers=1), do.sleep(11)),
     short("names are remapped, and the node is in a namespace",
         do.publisher("/robot/cam"), do.publisher("/b", name="/b"),
         do.relay(_front("a", "/b", output_prefix="/fused"),
@@ -262,7 +265,8 @@ _GRAPH: Final = (
         do.counts("one", buffered=0), do.counts("two", buffered=0)),
     short("who listens hears what has a header, once and from the first on",
         do.publisher("/a"), do.publisher("/b", reliability="best_effort"), do.publisher("/text", of=STRING),
-        do.publisher("/diagnostics", of=ARRAY), do.listen(8), do.served("/a", 1), do.served("/b", 1),
+        do.publisher("/diagnostics", of=ARRAY), do.publisher("/a/_hidden"), do.listen(8), do.served("/a", 1),
+        do.served("/b", 1),
         do.write("/a", 10, 20), do.sleep(0.1), do.write("/b", 10), do.sleep(0.3), do.write("/a", 0, data=b"\0\1\0\0"),
         do.publisher("/c"), do.served("/c", 1), do.write("/c", 20), do.heard()),
     long("who listens beside a relay passes over its outputs",
@@ -274,6 +278,14 @@ _GRAPH: Final = (
             for step in (do.write("/a", stamp), do.write("/b", stamp), do.sleep(0.1))),
         do.write("/a", 70), do.endpoints("/front/a", publishers=0),
         do.endpoints("/syncrelay/front/sets", publishers=0), do.endpoints("/diagnostics", publishers=0), do.observed()),
+    long("who observes looks longer for what has just begun",
+        _SENSORS, do.observe(PAIR, 1), do.served("/a", 1), do.served("/b", 1), do.sleep(0.5),
+        *(step for stamp in range(10, 60, 10)
+            for step in (do.write("/a", stamp), do.write("/b", stamp), do.sleep(0.1))), do.observed(),
+        blind=("notes",)),
+    long("a name that nobody publishes, and the only topic of its type",
+        do.publisher("/x", of=POINT), do.publisher("/b"), do.relay(_front({"topic": "/lidar", "type": POINT}, "/b")),
+        do.finding("no_publisher", naming="/x")),
     long("a name that nobody publishes, and one that is like it",
         do.publisher("/camera/image"), do.publisher("/b"),
         do.relay({**_front("/camera/imag", "/b"),
@@ -432,6 +444,11 @@ _LIFE: Final = (
         do.file({"front": group("/a", "/b", queue_size=7), "rear": group("/b", "/c")}), do.hang_up(reloads=1),
         do.sets(10), _out(1), do.finding("refused_by_dds", "rear", wordless=True), do.endpoints("/c", publishers=1),
         do.counts()),
+    long("a reload gives an output's name to another type",
+        _SENSORS, do.publisher("/p", of=POINT), do.relay(_front(row("/a", output="/x"), "/b")),
+        do.endpoints("/x", publishers=1),
+        do.file(_front({"topic": "/p", "type": POINT, "output": "/x"}, "/b")), do.hang_up(reloads=1),
+        do.served("/a", 0), do.endpoints("/x", publishers=1)),
     short("a managed node relays while it is active",
         _SENSORS, do.relay(PAIR, node=_MANAGED), do.phase("unconfigured"),
         do.transit("activate", "deactivate", "cleanup", "configure", "configure"), do.phase("inactive"),
@@ -506,5 +523,41 @@ _TRANSFORMS: Final = (
         do.counts(buffered=0)),
 )
 
+# Of ROS's own types, one that has fields for messages of two others.
+_BUNDLED: Final = group({"topic": "/a", "type": IMAGE, "stamp": "receive"},
+    {"topic": "/b", "type": COLOR, "stamp": "receive"}, policy="approximate_time_eager", slop="50s", outputs=False,
+    bundle={"topic": "/set", "type": MARKER})
+_BUNDLE_SET: Final = (
+    do.feed("/a", 0, data=b"\0\1\0\0" + bytes(8) + b"\1\0\0\0\0\0\0\0" * 2 + bytes(4)),
+    do.feed("/b", 0, data=b"\0\1\0\0" + bytes(16)))
+_BUNDLES: Final = (
+    long("sets leave in bundles, by the publisher that fits their inputs and the file",
+        do.publisher("/a", of=IMAGE), do.publisher("/b", of=COLOR), do.relay({"front": _BUNDLED}),
+        do.subscriber("/set", of=MARKER, reliability="best_effort"), do.ready(), _BUNDLE_SET, do.out("/set", 1),
+        do.file({"front": {**_BUNDLED, "slop": "49s"}}), do.call("reload"), _BUNDLE_SET, do.out("/set", 2),
+        do.endpoints("/set", publishers=1, subscribers=1), do.end("/a"),
+        do.publisher("/a", of=IMAGE, reliability="best_effort"),
+        do.endpoints("/set", publishers=1, reliability="best_effort"), do.ready(), _BUNDLE_SET, do.out("/set", 3),
+        do.file({"front": {**_BUNDLED, "outputs": True}}), do.call("reload"), do.endpoints("/front/b", publishers=1),
+        do.file({"rear": group("/c", "/d")}), do.call("reload"), do.endpoints("/set", publishers=0),
+        blind=("outputs",)),
+    long("a managed node that is deactivated ends its bundles and leaves the transforms",
+        do.publisher("/a", of=IMAGE), do.publisher("/b", of=COLOR), do.publisher("/tf", of=TF),
+        do.relay({"front": {**_BUNDLED, "transforms": {"target": "odom", "wait": "1s"}}}, node=_MANAGED),
+        do.transit("configure", "activate"), do.ready(), do.endpoints("/set", publishers=1), do.transit("deactivate"),
+        do.endpoints("/set", publishers=0), do.endpoints("/tf", publishers=1, subscribers=0)),
+)
+
 # fmt: on
-SCRIPTS: Final = (*_QOS, *_HISTORIES, *_SENT, *_GRAPH, *_MESSAGES, *_POLICIES, *_CLOCKS, *_LIFE, *_TRANSFORMS)
+SCRIPTS: Final = (
+    *_QOS,
+    *_HISTORIES,
+    *_SENT,
+    *_GRAPH,
+    *_MESSAGES,
+    *_POLICIES,
+    *_CLOCKS,
+    *_LIFE,
+    *_TRANSFORMS,
+    *_BUNDLES,
+)

@@ -16,8 +16,14 @@ KNOWN: Final = Path(__file__).with_name("seen.txt")
 """What each script shows; `python -m tests.conformance` prints it."""
 # How findings are worded is held by tests/explain/findings.txt; whom they name is held here.
 _CODES: Final = frozenset(code.value for code in Code)
+# Of a status; the rest is held by other tests, or noted with "at the end".
+_SHOWN: Final = (
+    *("relay", "node", "phase", "ready", "uptime_s", "reloads", "refused_reloads", "reload_error"),
+    *("groups", "level", "sets", "since_last_set_ms", "findings", "code", "text", "suggestion"),
+    *("inputs", "output", "lost", "publishers", "senders", "sent", "delivered", "subscribers"),
+    *("mismatch", "offered", "requested"),
+)
 _NAME: Final = re.compile(r"(?<!\w)/\w[\w/]*")
-_OF_GROUP: Final = ("front: ", "rear: ")
 # In the sources of ROS.
 _PLACE: Final = re.compile(r", at [^ ,]+:\d+")
 # With its unit, which goes by the size of a duration.
@@ -34,15 +40,33 @@ class Seen:
     """What was asked for, in the order of the script."""
     log: list[str] = field(default_factory=list)
     """The warnings and errors of the relay."""
+    inside: list[str] = field(default_factory=list, compare=False)
+    """What depends on the moment, and is the same again only in the simulated ROS: its log and its last status."""
 
 
 def told(title: str, seen: Seen, blind: Sequence[str]) -> str:
     """Write down what was seen but for what depends on chance: a line for each output, note and line of the log."""
     outputs = [f"{name}: {_messages(texts)}" for name, texts in seen.outputs.items()]
     notes = [_note(note) for note in seen.notes]
-    log = [f"log: {text.splitlines()[0]}" for text in seen.log if not text.startswith(_OF_GROUP)]
-    fields = {"outputs": outputs, "notes": notes, "log": log}
-    return "\n".join([title, *(line for field, lines in fields.items() if field not in blind for line in lines)])
+    if "outputs" in blind:
+        seen.inside.append(", ".join(f"{name}: {len(texts)}" for name, texts in seen.outputs.items()))
+    fields = {"outputs": outputs, "notes": notes}
+    shown = [line for field, lines in fields.items() if field not in blind for line in lines]
+    return "\n".join([title, *shown, *filter(None, seen.inside)])
+
+
+def short_of(document: Any) -> str:
+    """Write down what a status says of the graph and of the relay: nothing that is empty or 0."""
+    match document:
+        case dict():
+            rows = [(key, short_of(value)) for key, value in document.items() if key in _SHOWN]
+            return " ".join(f"{key}={value}" for key, value in rows if value)
+        case list():
+            return "".join(f"({short_of(each)})" for each in document)
+        case float():
+            return f"{document:.1f}" if document else ""
+        case _:
+            return str(document or "")
 
 
 def _messages(texts: Sequence[str]) -> str:

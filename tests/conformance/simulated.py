@@ -10,6 +10,9 @@ from tests.simulated.bus import Bus, BusNode, Participant, Reader, Weather, Writ
 from tests.simulated.node import SimulatedBackend, SimulatedGraph, SimulatedNode
 from tests.simulated.scheduler import SECOND, Process, Scheduler, SimulatedRuntime
 
+# Threads of the player.
+_NOT_WAITED_FOR = frozenset({"relay", "listen", "observe"})
+
 
 class _Reader:
     def __init__(self, reader: Reader) -> None:
@@ -38,12 +41,17 @@ class SimulatedWorld:
         observer = self._bus.participant(Process(self.scheduler, "observer"))
         observer.node("observer")
         self.graph = SimulatedGraph(observer)
+        self.made: list[str] = []
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.scheduler.close()
+
+    @property
+    def left(self) -> list[str]:
+        return [each for each in (*self.runtime.alive(), *sorted(self.runtime.held)) if each not in _NOT_WAITED_FOR]
 
     def writer(self, topic: str, type_name: str, profile: Profile, *, by: str, node: str) -> Writer:
         return self._node(by, node).writer(topic, type_name, profile)
@@ -80,6 +88,7 @@ class SimulatedWorld:
             namespace=names.get("__ns", config.node.namespace),
             is_simulated=config.node.use_sim_time,
             remaps=names,
+            made=self.made,
         )
         return node, SimulatedBackend(self.runtime)
 

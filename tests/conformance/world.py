@@ -1,6 +1,6 @@
 """What a ROS is to a script, be it real or simulated."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 from syncrelay.config.profile import Profile
@@ -53,6 +53,16 @@ class World(Protocol):
     @property
     def graph(self) -> Graph:
         """The graph, as somebody sees it who has nothing else to do."""
+        ...
+
+    @property
+    def made(self) -> Sequence[str]:
+        """What the relay has made (+) and ended (-) in DDS, in that order, where that is known."""
+        ...
+
+    @property
+    def left(self) -> Sequence[str]:
+        """What the relay's process holds, and which threads run there beside its first one, where that is known."""
         ...
 
     def writer(self, topic: str, type_name: str, profile: Profile, *, by: str, node: str) -> Writer:

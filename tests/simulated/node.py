@@ -3,7 +3,7 @@
 import logging
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,7 +17,7 @@ from syncrelay.dataflow.flow import Flow
 from syncrelay.dataflow.inbox import PolledInbox
 from syncrelay.relay.ports import Answer, Call, EndpointInfo, NodeName, Outcome, RclError
 from syncrelay.relay.types import name_of
-from tests.simulated.bus import BusNode, Participant, RefusedByDdsError
+from tests.simulated.bus import BusNode, Endpoint, Participant, RefusedByDdsError
 from tests.simulated.scheduler import MS, SECOND, SimulatedRuntime
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ _LOG: Final = logging.getLogger("syncrelay")
 _NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
 CLOCK_TYPE: Final = "rosgraph_msgs/msg/Clock"
 _OF_EVERY_NODE: Final = {"/rosout": "rcl_interfaces/msg/Log", "/parameter_events": "rcl_interfaces/msg/ParameterEvent"}
+_USUAL: Final = Profile(liveliness="automatic")
 # As the relay's node asks rclpy.
 _JUMP: Final = -SECOND
 
@@ -142,7 +143,9 @@ class SimulatedNode:
         namespace: str = "/",
         is_simulated: bool = False,
         remaps: Mapping[str, str] | None = None,
+        made: list[str] | None = None,
     ) -> None:
+        """Note in `made` what is made, refused and ended, and when."""
         self.participant = participant
         self.runtime = runtime
         self.node = participant.node(name, namespace)
@@ -157,6 +160,7 @@ class SimulatedNode:
         self.refusal: Callable[[str], str | None] = lambda _: None
         """Why DDS makes nothing on a topic, in the way of a fault."""
         self.publishers: list[SimulatedPublisher] = []
+        self._noted, self._began = [] if made is None else made, runtime.scheduler.now
         self._remaps = {self._expanded(old): self._expanded(new) for old, new in (remaps or {}).items()}
         self._carry_out: Callable[[str], Outcome] | None = None
         self._offered: dict[str, Call] = {}
@@ -218,11 +222,23 @@ class SimulatedNode:
         if why is not None:
             raise RclError(why)
         try:
-            return make(name)
+            made = make(name)
         except RefusedByDdsError as error:
+            self._note("refused", name)
             raise RclError(str(error)) from error
+        self._note("+", *self._told(made))
+        return made
+
+    def _note(self, *words: str) -> None:
+        self._noted.append(" ".join([f"{(self.runtime.scheduler.now - self._began) / SECOND:.1f}", *words]))
+
+    def _told(self, entity: Any) -> list[str]:
+        end: Endpoint = entity.writer if isinstance(entity, SimulatedPublisher) else entity.reader
+        unlike = [str(value) for key, value in asdict(end.profile).items() if value != getattr(_USUAL, key)]
+        return ["to" if end.is_writer else "from", end.topic, *unlike]
 
     def end(self, entity: Any) -> None:
+        self._note("-", *self._told(entity)[:2])
         if isinstance(entity, SimulatedPublisher):
             self.publishers.remove(entity)
             entity.writer.end()
