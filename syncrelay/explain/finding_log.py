@@ -1,5 +1,6 @@
 """When the log says that a group is silent: after a while, not at every poll, and once more when it recovers."""
 
+from collections import deque
 from collections.abc import Collection, Iterator
 from typing import Final, NamedTuple
 
@@ -21,6 +22,9 @@ _OVER: Final = 10 * _SECOND
 # While the relay has not yet tried a value, a line waits this long for the suggestion.
 _UNTIL_TRIED: Final = 10 * _SECOND
 
+# Of what is over, so much is kept for the summary at the end.
+_KEPT: Final = 5
+
 # Whoever pauses a relay gets an answer at once, so the log need not repeat it.
 _NOT_LOGGED: Final = frozenset({Code.PAUSED})
 
@@ -41,6 +45,17 @@ class Remark(NamedTuple):
         return self.findings[0].code if self.findings else None
 
 
+class Spell(NamedTuple):
+    """Something that was wrong with a group and was logged: how long after the start it began, how long it lasted.
+
+    In nanoseconds; `lasted` is None of what still holds.
+    """
+
+    after: int
+    lasted: int | None
+    text: str
+
+
 class FindingLog:
     """Turns the findings of one group, poll by poll, into remarks for the log."""
 
@@ -52,6 +67,23 @@ class FindingLog:
         self._log_again = 0
         self._well_since = 0
         self._warned: dict[tuple[Code, int | None], _Warning] = {}
+        self._start: int | None = None
+        self._silence = ""
+        self._over: deque[Spell] = deque(maxlen=_KEPT)
+        self.n_over = 0
+        """How many spells are over; the last five are in `spells`."""
+
+    @property
+    def spells(self) -> tuple[Spell, ...]:
+        """What was wrong, in the order in which it ended; what still holds comes last."""
+        holds = [(each.began, each.finding.text) for each in self._warned.values() if each.holds]
+        if self._is_silence_logged and self._quiet_since is not None:
+            holds.append((self._quiet_since, self._silence))
+        return (*self._over, *(Spell(began - (self._start or 0), None, text) for began, text in holds))
+
+    def _end(self, began: int, ended: int, text: str) -> None:
+        self._over.append(Spell(began - (self._start or 0), ended - began, text))
+        self.n_over += 1
 
     def remarks(
         self, facts: GroupFacts, findings: tuple[Finding, ...], explained: Collection[Code] = ()
@@ -61,6 +93,8 @@ class FindingLog:
         Codes that are `explained` by other findings are hidden, so their absence does not mean that they are over.
         """
         now = facts.figures.now
+        if self._start is None:
+            self._start = facts.figures.began
         if now < self._now:
             self._set_back(self._now - now)
         self._now = now
@@ -82,12 +116,15 @@ class FindingLog:
         is_back = last is not None and self._quiet_since is not None and last > self._quiet_since
         if self._quiet_since is not None and is_back and facts.standing is Standing.ENOUGH:
             if self._is_silence_logged:
+                self._end(self._quiet_since, now, self._silence)
                 yield Remark(Severity.OK, f"recovered after {words.seconds(now - self._quiet_since)}")
             self._quiet_since, self._is_silence_logged, self._well_since = None, False, now
         yield from self._warnings(facts, findings, explained, now)
 
     def _set_back(self, by: int) -> None:
         """Shift all times by as much as the machine's clock was set back, so that remarks go on at once."""
+        if self._start is not None:
+            self._start -= by
         if self._quiet_since is not None:
             self._quiet_since -= by
         self._log_again -= by
@@ -114,6 +151,7 @@ class FindingLog:
         self._pause = min(2 * self._pause, _LONGEST_PAUSE) if self._pause else now - self._quiet_since
         self._log_again = now + self._pause
         self._is_silence_logged = True
+        self._silence = f"no sets: {finding.text}"
         # The cause of a silence needs no line of its own after the silence is over.
         warning = self._warned.setdefault((finding.code, finding.input), _Warning(finding, now))
         warning.is_logged, warning.holds, warning.seen = True, False, now
@@ -147,6 +185,7 @@ class FindingLog:
                 warning.seen = now
             if warning.holds and now - warning.seen >= _OVER:
                 warning.holds = False
+                self._end(warning.began, warning.seen, warning.finding.text)
                 text = f"resolved {words.seconds(now - warning.seen)} ago: {warning.finding.text}"
                 yield Remark(Severity.OK, text, (warning.finding,))
 

@@ -7,6 +7,7 @@ from statistics import median_low
 from typing import NamedTuple, Self
 
 from syncrelay.explain.facts import GroupFacts
+from syncrelay.explain.finding_log import FindingLog
 from syncrelay.explain.findings import Finding
 from syncrelay.explain.judge import with_ok
 from syncrelay.explain.standing import Standing
@@ -48,6 +49,8 @@ class GroupReport:
     facts: GroupFacts
     problems: tuple[Finding, ...]
     last: Sequence[tuple[int | None, ...] | RecentDrop] = ()
+    log: FindingLog | None = None
+    """What was logged of the group since the start."""
 
     @cached_property
     def findings(self) -> tuple[Finding, ...]:

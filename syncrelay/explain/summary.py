@@ -1,20 +1,27 @@
-"""The summary that a relay and a replay end with: what became of every message."""
+"""The summary that a relay and a replay end with: what became of every message, and what was wrong in between."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
+from typing import Final
 
 from syncrelay.config.wording import counted
+from syncrelay.explain import words
+from syncrelay.explain.finding_log import FindingLog
 from syncrelay.explain.report import GroupReport
 from syncrelay.explain.unneeded import DropFates
 from syncrelay.logs import LOGGER
 from syncrelay.sync.counts import InputCounts
 
+_SOON_NS: Final = 1_000_000_000
+
 
 def log_summary(reports: Iterable[GroupReport]) -> None:
-    """Log what became of every message of groups."""
+    """Log what became of every message of groups, and what was wrong with them since the start."""
     for report in reports:
         facts = report.facts
         inputs = [(each.name, each.counts) for each in facts.inputs]
-        for line in summarize(facts.name, facts.figures.sets, inputs, facts.fates):
+        lines = summarize(facts.name, facts.figures.sets, inputs, facts.fates)
+        for line in chain(lines, [] if report.log is None else _spells(facts.name, report.log)):
             LOGGER.info(line, extra={"group": facts.name})
 
 
@@ -26,6 +33,17 @@ def summarize(
     for (topic, counts), each in zip(inputs, fates, strict=True):
         lacking = [inputs[other][0] for other in each.lacking]
         yield f"{group}:   {topic}: {_fates(counts, each, lacking)}"
+
+
+def _spells(group: str, log: FindingLog) -> Iterator[str]:
+    spells = log.spells
+    left_out = log.n_over - sum(each.lasted is not None for each in spells)
+    if left_out:
+        yield f"{group}:   {counted(left_out, 'spell')} of trouble before those that follow"
+    for each in spells:
+        lasted = "until the end" if each.lasted is None else f"for {words.seconds(each.lasted)}"
+        began = f"{words.seconds(each.after)} after the start" if each.after >= _SOON_NS else "from the start"
+        yield f"{group}:   {began}, {lasted}: {each.text}"
 
 
 def why_unneeded(lacking: Sequence[str]) -> str:

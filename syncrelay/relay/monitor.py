@@ -220,7 +220,7 @@ class Monitor:
             bundle=self._surroundings.bundle_of(binding),
         )
         found = judge.judge(facts)
-        self._reports[binding.group] = GroupReport(facts, found, batch.last)
+        self._reports[binding.group] = GroupReport(facts, found, batch.last, log)
         remarks = log.remarks(facts, found, judge.explained(facts))
         self._cause_log.hear(facts, found, remarks, now=self._runtime.monotonic_ns())
 

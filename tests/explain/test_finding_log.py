@@ -4,6 +4,8 @@ import pytest
 
 from syncrelay.explain import Code, Finding, FindingLog, GroupFacts, Severity, in_words, judge
 from syncrelay.explain.finding_log import Remark
+from syncrelay.explain.report import GroupReport
+from syncrelay.explain.summary import log_summary
 from tests.explain.support.groups import BEGAN, NOW, S, a_group, an_input
 
 DEAD = {"publishers": (), "figures": {"last_received": None, "rate_hz": 0.0}}
@@ -124,3 +126,40 @@ def test_a_clock_that_is_set_back_delays_nothing_by_more_than_a_look(set_back):
     usual, lines = played(1000), played(set_back)
     assert [text for _, text in lines] == [text for _, text in usual]
     assert all(0 <= later - sooner <= 2 for (sooner, _), (later, _) in zip(usual, lines, strict=True))
+
+
+@pytest.fixture
+def summary(caplog):
+    def said(log):
+        caplog.clear()
+        with caplog.at_level("INFO", "syncrelay"):
+            log_summary([GroupReport(at(100, last_set=99), (), log=log)])
+        return [line.partition(":   ")[2] for line in caplog.messages if "the start" in line or "spell" in line]
+
+    return said
+
+
+def test_what_was_wrong_is_said_once_more_at_the_end(summary):
+    log = FindingLog()
+    looked(log, at(5, last_set=None))
+    assert summary(log) == [f"from the start, until the end: no sets: {WHO}"]
+    looked(log, at(9, last_set=8.9))
+    assert summary(log) == [f"from the start, for 9 s: no sets: {WHO}"]
+
+
+def test_of_what_was_wrong_often_the_last_five_are_said(summary):
+    log = FindingLog()
+    for begin in range(0, 700, 100):
+        told(log, range(begin, begin + 30), last_set=lambda _, begin=begin: begin)
+        looked(log, at(begin + 32, last_set=begin + 31))
+    first, *others = summary(log)
+    assert first == "2 spells of trouble before those that follow"
+    assert [each.partition(" after")[0] for each in others] == ["3 min", "5 min", "7 min", "8 min", "10 min"]
+
+
+def test_a_clock_that_is_set_back_moves_nothing_in_the_summary(summary):
+    log = FindingLog()
+    told(log, range(30, 50), last_set=lambda _: 30)
+    looked(log, at(-3550, last_set=None))
+    looked(log, at(-3545, last_set=-3546))
+    assert summary(log) == [f"30 s after the start, for 24 s: no sets: {WHO}"]
