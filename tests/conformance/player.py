@@ -28,6 +28,7 @@ from tests.conformance.seen import MS, Seen, by_reason, endpoint, message, short
 from tests.conformance.world import Reader, World, Writer
 from tests.ros.cdr_messages import vector
 from tests.ros.transforms import transforms
+from tests.simulated.node import MADE
 from tests.simulated.running import Running
 
 _LOG: Final = logging.getLogger("syncrelay")
@@ -56,14 +57,16 @@ class Recorder(logging.Handler):
         super().__init__(logging.INFO)
         self._monotonic, self._began = monotonic, monotonic()
         self.texts: list[str] = []
-        self.lines: list[tuple[float, str]] = []
-        """When each line came, in seconds from the begin."""
+        self.lines: list[str] = []
+        """The first line of each, after the seconds from the begin; with what was made in DDS."""
         self.warnings: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
         text = record.getMessage() + (f"\n{record.exc_info[1]!r}" if record.exc_info else "")
+        self.lines.append(f"{self._monotonic() - self._began:.1f} {text.splitlines()[0]}")
+        if record.name == MADE:
+            return
         self.texts.append(text)
-        self.lines.append((self._monotonic() - self._began, text))
         if record.levelno >= logging.WARNING:
             self.warnings.append(text)
 
@@ -447,8 +450,7 @@ class Player:
             self.stop()
         for name in self._readers:
             self._taken(name)
-        log = [f"{at:.1f} {text.splitlines()[0]}" for at, text in self._recorder.lines]
-        self.seen.inside += [" | ".join(log), ", ".join(self._world.made), ", ".join(self._world.left)]
+        self.seen.inside += [" | ".join(self._recorder.lines), ", ".join(self._world.left)]
         self.seen.inside = [each.replace(str(self._folder), "FOLDER") for each in self.seen.inside]
         self.seen.log = sorted({self._blank(each) for each in self._recorder.warnings if not _BY_CHANCE.search(each)})
         return self.seen

@@ -89,7 +89,7 @@ class _Reader:
 class RealWorld:
     """A domain, for one script after another."""
 
-    made = left = ()
+    left = ()
 
     def __init__(self, domain: int, folder: Path, environment: Mapping[str, str]) -> None:
         self.runtime = SYSTEM

@@ -41,7 +41,6 @@ class SimulatedWorld:
         observer = self._bus.participant(Process(self.scheduler, "observer"))
         observer.node("observer")
         self.graph = SimulatedGraph(observer)
-        self.made: list[str] = []
 
     def __enter__(self) -> Self:
         return self
@@ -88,7 +87,6 @@ class SimulatedWorld:
             namespace=names.get("__ns", config.node.namespace),
             is_simulated=config.node.use_sim_time,
             remaps=names,
-            made=self.made,
         )
         return node, SimulatedBackend(self.runtime)
 

@@ -56,11 +56,6 @@ class World(Protocol):
         ...
 
     @property
-    def made(self) -> Sequence[str]:
-        """What the relay has made (+) and ended (-) in DDS, in that order, where that is known."""
-        ...
-
-    @property
     def left(self) -> Sequence[str]:
         """What the relay's process holds, and which threads run there beside its first one, where that is known."""
         ...

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
 
 _LOG: Final = logging.getLogger("syncrelay")
+# What is made, refused and ended in DDS, for who looks into the relay.
+MADE: Final = "syncrelay.made"
+_MADE: Final = logging.getLogger(MADE)
 _NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
 CLOCK_TYPE: Final = "rosgraph_msgs/msg/Clock"
 _OF_EVERY_NODE: Final = {"/rosout": "rcl_interfaces/msg/Log", "/parameter_events": "rcl_interfaces/msg/ParameterEvent"}
@@ -143,9 +146,7 @@ class SimulatedNode:
         namespace: str = "/",
         is_simulated: bool = False,
         remaps: Mapping[str, str] | None = None,
-        made: list[str] | None = None,
     ) -> None:
-        """Note in `made` what is made, refused and ended, and when."""
         self.participant = participant
         self.runtime = runtime
         self.node = participant.node(name, namespace)
@@ -160,7 +161,6 @@ class SimulatedNode:
         self.refusal: Callable[[str], str | None] = lambda _: None
         """Why DDS makes nothing on a topic, in the way of a fault."""
         self.publishers: list[SimulatedPublisher] = []
-        self._noted, self._began = [] if made is None else made, runtime.scheduler.now
         self._remaps = {self._expanded(old): self._expanded(new) for old, new in (remaps or {}).items()}
         self._carry_out: Callable[[str], Outcome] | None = None
         self._offered: dict[str, Call] = {}
@@ -224,21 +224,13 @@ class SimulatedNode:
         try:
             made = make(name)
         except RefusedByDdsError as error:
-            self._note("refused", name)
+            _MADE.info("refused %s", name)
             raise RclError(str(error)) from error
-        self._note("+", *self._told(made))
+        _MADE.info("+ %s", _told(made))
         return made
 
-    def _note(self, *words: str) -> None:
-        self._noted.append(" ".join([f"{(self.runtime.scheduler.now - self._began) / SECOND:.1f}", *words]))
-
-    def _told(self, entity: Any) -> list[str]:
-        end: Endpoint = entity.writer if isinstance(entity, SimulatedPublisher) else entity.reader
-        unlike = [str(value) for key, value in asdict(end.profile).items() if value != getattr(_USUAL, key)]
-        return ["to" if end.is_writer else "from", end.topic, *unlike]
-
     def end(self, entity: Any) -> None:
-        self._note("-", *self._told(entity)[:2])
+        _MADE.info("- %s", _told(entity))
         if isinstance(entity, SimulatedPublisher):
             self.publishers.remove(entity)
             entity.writer.end()
@@ -333,6 +325,12 @@ class SimulatedNode:
         if self._follower is not None:
             raise RuntimeError("a node leaves whose clock is still followed")
         self.participant.leave()
+
+
+def _told(entity: Any) -> str:
+    end: Endpoint = entity.writer if isinstance(entity, SimulatedPublisher) else entity.reader
+    unlike = [str(value) for key, value in asdict(end.profile).items() if value != getattr(_USUAL, key)]
+    return " ".join(["to" if end.is_writer else "from", end.topic, *unlike])
 
 
 class SimulatedPayload:
