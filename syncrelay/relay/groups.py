@@ -126,8 +126,7 @@ class Groups:
         self._loop.call(lambda: self.flush(DropReason.SHUTDOWN)).result()
         self.wait_until_acknowledged(patience_ns=patience_ns)
         self.bindings.end_publishers()
-        self.bundles.follow(())
-        self.manifests.end_others(())
+        self._end_shared_publishers()
 
     def wait_until_acknowledged(self, *, patience_ns: int) -> None:
         """Give reliable subscribers so many nanoseconds to get what was published last."""
@@ -145,10 +144,14 @@ class Groups:
         """Run no groups."""
         self.bindings.run(())
         self._transforms.serve(())
-        self.bundles.follow(())
-        self.manifests.end_others(())
+        self._end_shared_publishers()
         self._loop.deadline = None
         self._changed(self.config)
+
+    def _end_shared_publishers(self) -> None:
+        """End those of bundles and manifests, which groups hand on to each other."""
+        self.bundles.follow(())
+        self.manifests.end_others(())
 
     def refuse_reload(self, reason: str) -> None:
         """Remember that a reload failed, and why."""

@@ -69,7 +69,7 @@ class Manifests:
     def publishers_of(self, group: GroupRelay) -> list[Publisher]:
         """Return the publisher of a group's manifests, if it has one."""
         held = self._publishers.get(group.config.name)
-        return [held[0]] if held and self._is_wanted(group) else []
+        return [held[0]] if held else []
 
     def wait_until_acknowledged(self, deadline: int) -> None:
         """Publish what was noted; give subscribers until `deadline`, by time.monotonic_ns(), to get it."""
