@@ -44,8 +44,8 @@ class McapFile:
         among = frozenset(wanted)
         chosen = {number: channel if channel in among else None for number, channel in self._by_id.items()}
         index = self._index
-        needed = [each for each in index.segments if is_needed(index.holds.get(each, ()), chosen)]
-        needed.sort(key=lambda each: each.begin)
+        by_time = sorted(index.segments, key=lambda each: each.begin)
+        needed = [each for each in by_time if is_needed(index.holds.get(each, ()), chosen)]
         self.position = sum(each.size for each in index.segments) - sum(each.size for each in needed)
         parts = None
         if not self._file.is_near:

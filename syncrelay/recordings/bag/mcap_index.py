@@ -7,6 +7,7 @@ power leaves exactly such files, so records are walked here and only parsed by m
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
+from itertools import chain
 from struct import Struct
 from typing import Final
 
@@ -73,15 +74,11 @@ class McapIndex:
             chunks = list(self._summary())
         except UNREADABLE:
             chunks = []
-        ordered = sorted(chunks, key=lambda each: each.chunk_start_offset)
-        ends = [each.chunk_start_offset + each.chunk_length for each in ordered]
-        if (
-            not (chunks and self.channels)
-            or ordered[0].chunk_start_offset < len(MAGIC)
-            or ends[-1] > self._size
-            or any(end > after.chunk_start_offset for end, after in zip(ends, ordered[1:], strict=False))
-            or any(each.message_start_time > each.message_end_time for each in chunks)
-        ):
+        places = sorted((each.chunk_start_offset, each.chunk_start_offset + each.chunk_length) for each in chunks)
+        borders = [len(MAGIC), *chain.from_iterable(places), self._size]
+        are_apart = borders == sorted(borders)
+        are_in_time = all(each.message_start_time <= each.message_end_time for each in chunks)
+        if not (chunks and self.channels and are_apart and are_in_time):
             return False
         self.segments = [
             Segment(each.chunk_start_offset, each.chunk_length, each.message_start_time, each.message_end_time)

@@ -39,15 +39,14 @@ def read_in_order(
     read: Callable[[Segment], list[RawMessage]],
     losses: Losses,
 ) -> Iterator[tuple[Segment, list[RawMessage]]]:
-    """Yield each segment in the order of time, with the messages that no later segment can precede.
+    """Yield segments, given in the order in which they begin, with the messages that no later segment can precede.
 
     What comes too late for that, as its segment tells other times than it has, is counted by `losses`, as is what
     belongs to no channel or no time, and is left out.
     """
-    by_time = sorted(segments, key=lambda segment: segment.begin)
     held: list[RawMessage] = []
     until = 0
-    for place, segment in enumerate(by_time):
+    for place, segment in enumerate(segments):
         held += read(segment)
         # Timsort merges runs that are sorted already.
         held.sort(key=_RECEIVED)
@@ -56,8 +55,8 @@ def read_in_order(
         if too_late:
             losses.too_late(too_late)
         due = len(held)
-        if place + 1 < len(by_time):
-            due = bisect_right(held, by_time[place + 1].begin, key=_RECEIVED)
+        if place + 1 < len(segments):
+            due = bisect_right(held, segments[place + 1].begin, key=_RECEIVED)
         yield segment, held[:due]
         if due:
             until = held[due - 1][1]

@@ -84,6 +84,7 @@ _ALL_KINDS = {
     "rosbag2 MCAP, file compressed": _rosbag2(plugin=StoragePlugin.MCAP, mode=CompressionMode.FILE),
     "MCAP without an index, but a summary": mcap(index_types=IndexType.NONE),
     "MCAP with an index of chunks alone": mcap(index_types=IndexType.CHUNK),
+    "MCAP with an index that describes no channel": mcap(repeat_channels=False, repeat_schemas=False),
     "MCAP of another profile": mcap(profile=""),
     "MCAP, split": _split(_split_mcap),
     "MCAP, gzip": _packed(mcap(), ".gz", gzip.compress),

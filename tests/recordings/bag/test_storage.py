@@ -123,6 +123,24 @@ def test_an_index_that_hides_a_channel_is_told_by_the_statistics(server, tmp_pat
         assert bool(near_faults) == (len(near) < 30)
 
 
+def test_an_index_of_messages_that_lies_hides_none_unsaid(tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", rig_with_images(20, size=100), chunk_size=1000)
+    near, content = read(path, topics={"/camera"}), path.read_bytes()
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    for number, begin in summary.chunk_indexes[1].message_index_offsets.items():
+        # Opcode, length, channel, number of bytes that follow; for each message its time and place.
+        length = 9 + int.from_bytes(content[begin + 1 : begin + 9], "little")
+        for at in range(length):
+            flipped = content[begin + at] ^ 1 << at % 8
+            changed = content[: begin + at] + bytes([flipped]) + content[begin + at + 1 :]
+            fsspec.filesystem("memory").pipe(f"/{tmp_path.name}", changed)
+            far = read(f"memory://{tmp_path.name}", topics={"/camera"})
+            is_read = summary.channels[number].topic == "/camera" and not 11 <= at < 15
+            assert far == near or (not is_read and far.faults), (number, at)
+
+
 def test_statistics_that_count_a_message_more_than_there_is_are_noticed(server, tmp_path):
     path = write_mcap(tmp_path / "rig.mcap", rig(30), chunk_size=1)
     _with_summary(path, struct.pack("<HQ", 1, 30), struct.pack("<HQ", 1, 31))
