@@ -3,6 +3,7 @@
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
@@ -11,6 +12,8 @@ import numpy.typing as npt
 from syncrelay.clock import UNREADABLE
 from syncrelay.config import Distance, GroupConfig
 from syncrelay.sync import Message
+from syncrelay.sync.latest_at_ticks import REST_NS
+from syncrelay.sync.ticks import Ticks
 
 Nanoseconds: TypeAlias = npt.NDArray[np.int64]
 
@@ -66,7 +69,8 @@ class PossibleSets:
 
     `stamps` are those of the pivot's messages without offset, `spans` those of the sets, `queues` how many messages the
     fullest queue must hold until the set is complete. `is_exact` says that the stamps of a set are meant to be equal.
-    Where `is_alone`, one input is required, and each of its messages is a set with a span of 0.
+    Where `is_alone`, one input is required, and each of its messages is a set with a span of 0. Where `is_at_ticks`, a
+    clock triggers: there is a set for each tick at which every input has a message, and `stamps` are the ticks.
     """
 
     among: tuple[int, ...]
@@ -76,6 +80,7 @@ class PossibleSets:
     queues: Nanoseconds
     is_exact: bool = False
     is_alone: bool = False
+    is_at_ticks: bool = False
 
     def __len__(self) -> int:
         return len(self.spans)
@@ -144,6 +149,8 @@ def possible_sets(
 
     A window cuts partners off: in one, only those messages count that have something of each input on either side.
     """
+    if config.ticks is not None:
+        return _sets_at_ticks(config, config.ticks, inputs, among)
     ordered = [in_order(inputs[index], config.topics[index].offset_ns) for index in among]
     if not all(len(each.stamps) for each in ordered):
         return None
@@ -181,6 +188,42 @@ def possible_sets(
     return PossibleSets(
         tuple(among), among[pivot], unshifted[belong], spans[belong], queues[belong], is_exact, is_alone
     )
+
+
+def _sets_at_ticks(
+    config: GroupConfig, ticks: Ticks, inputs: Sequence[Received], among: Sequence[int]
+) -> PossibleSets | None:
+    """Return the sets of the ticks while messages came: each leaves `max_wait` later with what came by then."""
+    if not all(inputs[index].are_stamped.any() for index in among):
+        return None
+    received = np.sort(shifted(np.concatenate([each.received for each in inputs]), 0))
+    # A clock may have been set far off: ticks that rest are not counted.
+    breaks = np.nonzero(np.diff(received) > REST_NS)[0]
+    begins, ends = received[np.append(0, breaks + 1)].tolist(), received[np.append(breaks, -1)].tolist()
+    first = max(int(inputs[index].received.min()) for index in among)
+    numbers = chain.from_iterable(
+        range(ticks.first_from(max(first, begin)), ticks.last_until(end) + 1)
+        for begin, end in zip(begins, ends, strict=True)
+    )
+    at = np.fromiter(map(ticks.at, numbers), dtype=np.int64)
+    wait, oldest = config.options.max_wait or 0, np.zeros(len(at), dtype=np.int64)
+    for index in among:
+        oldest = np.maximum(oldest, _ages_at(at, inputs[index], config.topics[index].offset_ns, wait))
+    belong = oldest < _FAR
+    queues, pivot = np.ones(len(at), dtype=np.int64), min(among, key=lambda index: len(inputs[index].stamps))
+    return PossibleSets(tuple(among), pivot, at[belong], oldest[belong], queues[belong], is_at_ticks=True)
+
+
+def _ages_at(ticks: Nanoseconds, messages: Received, offset: int, max_wait: int) -> Nanoseconds:
+    """Return how old an input's latest message is at each tick, of those that came in time for it; _FAR without one."""
+    is_set = messages.are_stamped
+    stamps = shifted(messages.stamps[is_set], offset)
+    # From the first tick after this on, a message is there.
+    usable = np.maximum(stamps, shifted(messages.received[is_set], -max_wait))
+    order = np.argsort(usable, kind="stable")
+    latest, at = np.maximum.accumulate(stamps[order]), np.searchsorted(usable[order], ticks, side="right")
+    ages: Nanoseconds = np.where(at > 0, np.minimum(ticks - latest[np.maximum(at - 1, 0)], _FAR), _FAR)
+    return ages
 
 
 def tightest_spans(count: int, found: Sequence[Sides]) -> tuple[Nanoseconds, Nanoseconds]:

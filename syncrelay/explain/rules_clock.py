@@ -6,9 +6,10 @@ from typing import Final
 
 from syncrelay.config import Distance
 from syncrelay.explain import words
-from syncrelay.explain.codes import Severity
+from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Fault, Found
+from syncrelay.explain.other_stamps import offered_stamps
 from syncrelay.explain.rules_flow import waited_for_relay
 
 _OFF: Final = SECOND
@@ -37,10 +38,11 @@ def off_the_clock(facts: GroupFacts) -> Found:
     are_all = len(off) == len(required) > 1 and max(off.values()) - min(off.values()) < _OFF
     whose = "all inputs" if are_all else facts.inputs[index].name
     clock, to_one_clock = _clock(facts)
+    mapped = "" if are_all else offered_stamps(facts, Code.OTHER_CLOCK, index)
     yield Fault(
         f"stamps of {whose} are {words.span_of_time(abs(by))} {'behind' if by > 0 else 'ahead of'} {clock},"
         " which triggers the sets",
-        to_one_clock,
+        to_one_clock + mapped,
         Severity.ERROR,
         input=None if are_all else index,
     )

@@ -105,15 +105,24 @@ class Suggester:
         if pacemaker is None:
             rates = [_rate(each) for each in recent]
             pacemaker = min(config.enough(rates), key=rates.__getitem__)
-        messages = _last(recent, pacemaker)[-most:]
+        # A run takes as long for a tick as for a message.
+        longest = None if config.ticks is None else most * config.ticks.period_ns
+        messages = _last(recent, pacemaker, longest)[-most:]
         inputs = as_arrays(messages, len(config.topics))
         return Trials(config, lambda: self._budget.spent_on(messages), inputs, is_window=True)
 
 
-def _last(recent: Sequence[Sequence[tuple[int, int]]], pacemaker: int) -> tuple[Message, ...]:
-    """Return the last messages in the order of receipt: a number of the slowest input's, and what came since."""
+def _last(
+    recent: Sequence[Sequence[tuple[int, int]]], pacemaker: int, longest: int | None = None
+) -> tuple[Message, ...]:
+    """Return the last messages in the order of receipt: a number of the slowest input's, and what came since.
+
+    Where it may be no `longest` than a time, in nanoseconds, what came before that is left out.
+    """
     since = recent[pacemaker][-_PIVOTS:]
     begin = min(since[0][1], since[-1][1] - _AT_LEAST) if since else 0
+    if since and longest is not None:
+        begin = max(begin, max(each[-1][1] for each in recent if each) - longest)
     came = [
         Message(index, stamp, received)
         for index, each in enumerate(recent)

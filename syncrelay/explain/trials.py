@@ -174,15 +174,15 @@ class Trials:
         }
 
         def take(outcomes: Sequence[Outcome], _now: int) -> None:
-            for stamps in (outcome.stamps for outcome in outcomes if isinstance(outcome, Match)):
+            for stamps, tick in ((each.stamps, each.tick) for each in outcomes if isinstance(each, Match)):
                 for possible, span_of, (expected, spans) in counted.values():
-                    pivot = stamps[possible.pivot]
+                    pivot = tick if possible.is_at_ticks else stamps[possible.pivot]
                     allowed = None if pivot is None else span_of.get(pivot)
                     of_set = [
                         stamp + offsets[index] for index in possible.among if (stamp := stamps[index]) is not None
                     ]
                     if allowed is not None and len(of_set) == len(possible.among):
-                        span = max(of_set) - min(of_set)
+                        span = (max(of_set) if tick is None else tick) - min(of_set)
                         if span <= possible.widest:
                             expected.append(allowed)
                             spans.append(span)

@@ -44,9 +44,9 @@ class GroupWatch:
         self._clock_set: Step | None = None
         self._observation = Observation(config, began=began)
         self._standing = StandingWatch()
-        # Keys are not kept: what is matched by them cannot be run again. Nor can what a clock triggered: it may have
-        # been a simulated one, and times of receipt are this machine's.
-        can_run = config.options.by_stamp and config.ticks is None
+        # Keys are not kept: what is matched by them cannot be run again. Nor can what a simulated clock triggered:
+        # times of receipt are this machine's.
+        can_run = config.options.by_stamp and (config.ticks is None or not config.inputs.node.use_sim_time)
         self._suggester = Suggester(config, self._observation.recent, budget, whole) if can_run else None
 
     def add(

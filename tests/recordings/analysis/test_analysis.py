@@ -1,6 +1,7 @@
 """What the analysis measures, on streams of which all is known."""
 
 import random
+import re
 from array import array
 from dataclasses import replace
 
@@ -8,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncrelay.explain import UNREADABLE
+from syncrelay.explain import UNREADABLE, Code
 from syncrelay.recordings.analysis.analysis import analyze_group, group_of
 from syncrelay.recordings.analysis.curves import curves_of
 from syncrelay.recordings.analysis.evaluation import evaluate
 from syncrelay.recordings.analysis.pairs import pair
-from syncrelay.recordings.analysis.streams import Stream
+from syncrelay.recordings.analysis.streams import Stream, stamped
 from syncrelay.recordings.analysis.topics import figures_of
 from syncrelay.recordings.analysis.watching import judged_seconds, watch_group
 from syncrelay.sync import DropReason
@@ -217,6 +218,26 @@ def test_the_findings_are_those_of_the_running_relay():
     first = watch_group(group_of(_pair_of(), "front"), streams)[0]
     assert (first.finding.code.value, first.finding.severity.name) == ("over_slop", "ERROR")
     assert 20 < first.seconds <= 30
+
+
+@pytest.mark.parametrize(("max_age", "cures"), [("150ms", True), ("60ms", False)])
+def test_a_device_is_offered_to_be_mapped_where_that_brings_the_sets_of_a_clock_in_the_recording(max_age, cures):
+    def analyzed(**device):
+        topics = inputs({"/a": VECTOR, "/b": VECTOR})
+        topics[1].update(device)
+        group = {"policy": "latest_time", "trigger": "37 Hz", "max_age": max_age, "topics": topics}
+        streams = streams_of(every(20 * MS, 2000), every(100 * MS, 400, jitter=MS))
+        streams[1].stamps[:] = array("q", [stamp - 7200 * _SECOND for stamp in streams[1].stamps])
+        text = config({"front": group})
+        return _analyzed(stamped(group_of(text, "front"), streams), text)
+
+    first, mapped = analyzed().findings[0].finding, analyzed(clock="device")
+    assert first.code is Code.OTHER_CLOCK
+    offered = re.search(r"write `clock: device` at /b, which would give (\d+) of (\d+) ", first.suggestion)
+    assert (offered is not None) is cures
+    if offered is not None:
+        assert len(mapped.evaluation.sets) == int(offered[1]) == int(offered[2])
+    assert (mapped.findings == ()) is cures
 
 
 def _watched(streams):
