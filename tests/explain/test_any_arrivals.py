@@ -18,7 +18,8 @@ _TOPICS = inputs({"/a": VECTOR, "/b": VECTOR})
 _SLOP = {"policy": "approximate_time", "slop": "20ms"}
 _HELD = {"policy": "latest_time", "trigger": "/a", "max_age": "1s", "topics": _TOPICS}
 _OPTIONAL = {**_SLOP, "max_wait": "100ms", "topics": [_TOPICS[0], {**_TOPICS[1], "required": False}]}
-_GROUPS = load_text(config({"held": _HELD, "optional": _OPTIONAL, "pair": {**_SLOP, "topics": _TOPICS}})).groups
+_PAIR, _TICKS = {**_SLOP, "topics": _TOPICS}, {**_HELD, "trigger": "20 Hz"}
+_GROUPS = load_text(config({"held": _HELD, "optional": _OPTIONAL, "pair": _PAIR, "ticks": _TICKS})).groups
 # The last ones have failed: of an input that lost its clock, and then had no stamp, and of one too late for any wait.
 _SEEDS = (
     *(chosen(short=1, long=random.randrange(10**9)) + n for n in range(chosen(short=20, long=3000))),

@@ -5,6 +5,7 @@ from typing import Any
 
 from syncrelay.config import load_text
 from syncrelay.explain.nearest import as_arrays, shifted
+from syncrelay.explain.other_stamps import by_other_stamps
 from syncrelay.explain.trials import REQUIRED, Trials
 from syncrelay.sync import Message
 from tests.explain.scenario import BEGAN, IMU, MS, S
@@ -24,11 +25,18 @@ def _drawn(seed: int):
     for topic in topics:
         topic.update(chance.choice([{}, {}, {"offset": chance.choice(["-37s", "4000000000s", "-9000000000s"])}]))
     group: dict[str, Any] = {
-        "policy": chance.choice(["approximate_time", "approximate_time_eager", "exact_time"]),
+        "policy": chance.choice(["approximate_time", "approximate_time_eager", "exact_time", "latest_time"]),
         "topics": topics,
     }
     group |= {"queue_size": chance.choice([1, 10]), "max_wait": chance.choice(["100ms", "3000000000s"])}
-    if group["policy"] != "exact_time":
+    if group["policy"] == "latest_time":
+        group |= {
+            "trigger": "20 Hz",
+            "queue_size": 10,
+            "max_wait": "100ms",
+            "max_age": chance.choice(["1ms", "9000000000s"]),
+        }
+    elif group["policy"] != "exact_time":
         group["slop"] = chance.choice(["1ms", "9000000000s"])
     if chance.random() < 0.3:
         topics[-1]["required"] = False
@@ -53,6 +61,8 @@ def _ask_everything(group, came):
         trials = Trials(group, lambda: messages, as_arrays(messages, len(came)), is_window=is_window)
         for target in (REQUIRED, *trials.optional):
             trials.verdict(target, _KEYS)
+            for index in range(len(came)):
+                by_other_stamps(trials, index, target)
         offsets = [*trials.offsets(), *filter(None, map(trials.clock_offset, range(len(came))))]
         for offset in offsets:
             trials.by_offset(offset)
