@@ -305,7 +305,8 @@ def resolution(rig: Rig) -> Truth | None:
     flow, unit = _one(rig), rig.chance.choice([10, 100, 1000]) * MS
     exact = flow.stamps
     flow.stamps = exact // unit * unit
-    if unit <= max(2 * rig.slop, 0.3 * flow.period) or (unit < flow.period and _lost(rig) < _MANY):
+    left = spans(rig)
+    if not len(left) or unit <= max(2 * rig.slop, 0.3 * flow.period) or (unit < flow.period and _lost(rig) < _MANY):
         return None
     # Two stamps show of what they are multiples.
     seen = rig.seen(max(0.0, 2 * (unit - flow.period) / S))
@@ -315,7 +316,7 @@ def resolution(rig: Rig) -> Truth | None:
         return _truth("over_slop duplicates", flow, seen, (unit,))
     # Of a period that is a multiple of the unit, all that shows is that they lie off by what was cut.
     topics = frozenset(each.topic for each in rig.flows) if len(rig.flows) == 2 else frozenset({flow.topic})
-    return Truth(frozenset({"over_slop"}), topics, seen, (unit, *np.quantile(spans(rig), [0.02, 0.5, 0.95]).tolist()))
+    return Truth(frozenset({"over_slop"}), topics, seen, (unit, *np.quantile(left, [0.02, 0.5, 0.95]).tolist()))
 
 
 @_kind(policies=_ANY)
