@@ -38,9 +38,8 @@ class Metadata:
         gone = [name for name in self.files if _unpacked(name) not in plain]
         if len(there) - (len(self.files) - len(gone)) >= len(gone):
             return ""
-        counts = [self.files[name] for name in gone]
-        messages = sum(count or 0 for count in counts)
-        held = f", with {counted(messages, 'message')}" if None not in counts else ""
+        counts = [count for name in gone if (count := self.files[name]) is not None]
+        held = f", with {counted(sum(counts), 'message')}" if len(counts) == len(gone) else ""
         names = [printable(name) for name in gone[:_NAMED]]
         if len(gone) > _NAMED:
             names.append(f"{len(gone) - _NAMED} more")

@@ -31,6 +31,7 @@ def read(*words: Path | str, topics: set[str] | None = None) -> Read:
         for batch in recording.batches(wanted):
             frames += [Frame(each.topic, each.type, time, payload) for each, time, payload in batch]
             positions.append(recording.position)
+        assert all(positions[1:])
         assert [*positions, recording.size] == sorted([*positions, recording.position])
         return Read(frames, [fault.removeprefix(name) for fault in recording.faults], told)
 

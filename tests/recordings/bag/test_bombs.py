@@ -129,6 +129,14 @@ def test_nothing_unpacks_to_more_than_a_gibibyte():
         spent.unpack(1)
 
 
+def test_a_file_that_unpacks_to_more_than_fits_is_read_up_to_there(tmp_path, monkeypatch):
+    monkeypatch.setattr(effort, "ALWAYS_FITS", _mib(1))
+    packed = bz2.compress(write_mcap(tmp_path / "rig.mcap", FRAMES).read_bytes() + bytes(_mib(16)))
+    (tmp_path / "rig.mcap.bz2").write_bytes(packed)
+    frames, (fault,), _ = read(tmp_path / "rig.mcap.bz2")
+    assert (frames, effort.TOO_MUCH in fault) == (FRAMES, True)
+
+
 def test_many_images_of_one_color_are_read(tmp_path, monkeypatch):
     """Each chunk is packed 10,000 times, and holds messages."""
     monkeypatch.setattr(effort, "ALWAYS_FITS", _mib(1))

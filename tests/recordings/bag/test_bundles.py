@@ -21,8 +21,8 @@ from tests.ros.manifests import read
 
 _SET = "rig_msgs/msg/Set"
 _TEXT = """\
-uint8[] marks [1, 2, 3]
-byte kind 200
+uint8[] marks [1, 2, 128]
+byte kind 128
 string word "a # b"
 geometry_msgs/Vector3Stamped camera
 float64[2] pair
@@ -68,8 +68,8 @@ def _expected(number: int, camera: bytes, lidar: bytes | None) -> bytes:
     empty = types[VECTOR](types["std_msgs/msg/Header"](time(0, 0), ""), zero)
     stamps = [stamp_of(camera), stamp_of(lidar) if lidar else 0]
     whole = types[_SET](
-        np.array([1, 2, 3], "uint8"),
-        200 - 256,
+        np.array([1, 2, 128], "uint8"),
+        128 - 256,
         "a # b",
         store.deserialize_cdr(camera, VECTOR),
         np.zeros(2),

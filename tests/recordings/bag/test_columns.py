@@ -51,6 +51,12 @@ def test_batches_that_are_filled_hold_the_same_messages_and_none_is_empty(sizes,
     assert len(batches) <= len([size for size in sizes if size])
 
 
+@pytest.mark.parametrize(("size", "expected"), [(1, [2000, 2000, 500]), (1_000_000, [4, 4, 2])])
+def test_a_batch_is_full_with_2000_messages_or_4_mb(size, expected):
+    message = (Channel(0, "/a", "a/msg/A", Encoding.CDR), 0, bytes(size))
+    assert [len(batch) for batch in filled([message] for _ in range(sum(expected)))] == expected
+
+
 def test_stamps_of_a_device_are_mapped_as_they_are_live(caplog):
     topics = [{"topic": "/a", "type": _VECTOR, "clock": "device", "delay": "8ms"}, {"topic": "/b", "type": _VECTOR}]
     group = {"policy": "approximate_time", "slop": "20ms", "topics": topics}

@@ -203,6 +203,13 @@ def test_a_metadata_yaml_that_is_not_of_rosbag2_does_not_matter(about, tmp_path)
     assert read(_with_metadata(_ALL_KINDS["MCAP, split"](tmp_path), about)) == (FRAMES, [], [])
 
 
+@pytest.mark.parametrize(("size", "why"), [(4_000_000, "is damaged"), (4_000_001, "is larger than 4 MB")])
+def test_a_metadata_yaml_that_cannot_be_read_is_said(size, why, tmp_path):
+    folder = _ALL_KINDS["MCAP, split"](tmp_path)
+    (folder / "metadata.yaml").write_text("#" * size)
+    assert read(folder) == (FRAMES, [f"metadata.yaml {why}: missing files would not be noticed"], [])
+
+
 @pytest.mark.parametrize("change", ["never closed", "cut off"])
 def test_a_ros1_bag_without_an_index_is_refused_with_the_command_that_makes_one(change, tmp_path):
     path = ros1()(tmp_path)
