@@ -449,7 +449,7 @@ _LIFE: Final = (
         _SENSORS, do.publisher("/p", of=POINT), do.relay(_front(row("/a", output="/x"), "/b")),
         do.endpoints("/x", publishers=1),
         do.file(_front({"topic": "/p", "type": POINT, "output": "/x"}, "/b")), do.hang_up(reloads=1),
-        do.served("/a", 0), do.endpoints("/x", publishers=1)),
+        do.subscriber("/x", of=POINT), do.ready("/p", "/x"), do.sleep(0.5), do.endpoints("/x", publishers=1)),
     short("a managed node relays while it is active",
         _SENSORS, do.relay(PAIR, node=_MANAGED), do.phase("unconfigured"),
         do.transit("activate", "deactivate", "cleanup", "configure", "configure"), do.phase("inactive"),
