@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncrelay.sync import Drop, DropReason, LatestAtTicks, Match, Message, Restamp, SyncGroup, Ticks
+from syncrelay.sync import Drop, DropReason, LatestAtTicks, Match, Message, SyncGroup, Ticks
 from syncrelay.sync.latest_at_ticks import REST_NS
 from tests.sync.support.rigs import START, TICK, Step, options, run, steps, take
 from tests.sync.support.timeline import START_NS, TICK_NS
@@ -61,17 +61,6 @@ def test_every_time_lies_between_two_ticks_and_a_period_is_rounded_up(numerator,
     assert ticks.hz * ticks.period_ns == pytest.approx(10**9, rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("restamp", "expected"), [(None, None), (Restamp.TICK, at(50)), (Restamp.EARLIEST, at(10)), (0, at(20))]
-)
-def test_a_set_may_have_the_stamp_of_its_tick_and_always_tells_it(restamp, expected):
-    group = by_clock(restamp=restamp)
-    for each in (message(0, 20), message(1, 10)):
-        group.add(each, now=at(30))
-    (match,) = group.expire(now=at(50))
-    assert (match.tick, match.stamp) == (at(50), expected)
-
-
 def test_an_hour_in_which_nothing_came_costs_no_work_and_gives_no_more_sets_than_its_first_seconds():
     group = by_clock(hz=1000, queue=10)
     for index in range(2):
@@ -84,52 +73,6 @@ def test_an_hour_in_which_nothing_came_costs_no_work_and_gives_no_more_sets_than
     assert group.next_deadline() == at(hour + 1)
     (match,) = group.expire(now=at(hour + 1))
     assert match.stamps == (at(hour), at(0))
-
-
-def test_no_tick_comes_twice_when_the_clock_is_corrected_and_all_come_again_when_it_starts_again():
-    group = by_clock()
-    for index in range(2):
-        group.add(message(index, 0), now=at(0))
-    assert [match.tick for match in group.expire(now=at(2000))] == [at(50 * n) for n in range(1, 41)]
-    assert group.expire(now=at(1000)) == []
-    assert group.next_deadline() == at(2050)
-    # A reset simulation, which also flushes.
-    group.flush(DropReason.TIME_JUMP)
-    for index in range(2):
-        group.add(message(index, 10), now=at(20))
-    assert [match.tick for match in group.expire(now=at(100))] == [at(50), at(100)]
-    group.pass_over(now=at(-1500))
-    assert group.next_deadline() == at(50)
-
-
-def test_a_simulated_clock_that_begins_at_zero_has_all_its_ticks():
-    group = by_clock()
-    for index in range(2):
-        group.add(Message(index, 1, None), now=1)
-    assert [match.tick for match in group.expire(now=100_000_000)] == [50_000_000, 100_000_000]
-
-
-def test_what_is_let_go_is_all_but_the_latest_of_each_input():
-    group = by_clock(max_wait=100)
-    for each in (message(0, 0), message(0, 60), message(1, 10)):
-        group.add(each, now=at(70))
-    assert list(group.let_go(DropReason.PAUSED)) == [Drop(message(0, 0), DropReason.PAUSED)]
-    assert [counts.buffered for counts in group.counts()] == [1, 1]
-
-
-def test_the_queue_that_is_needed_has_room_for_every_tick_that_is_waited_for():
-    def overflowed(queue):
-        group = by_clock(queue=queue, max_wait=50)
-        left = []
-        for ms in range(0, 2000, 10):
-            for index in range(2):
-                left += group.add(message(index, ms), now=at(ms))
-        return group.counts()[0].needed_queue, len(sets_of(left))
-
-    assert overflowed(4) == (12, 0)
-    needed, sets = overflowed(12)
-    assert needed is None
-    assert sets == 30
 
 
 _RATES = (Ticks(100), Ticks(20), Ticks(30), Ticks(2997, 100), Ticks(300), Ticks(3, 2))

@@ -55,13 +55,6 @@ def played(group, sent):
     return left
 
 
-def turns_of(left):
-    """Of each set: the turns of its messages, None where one is missing."""
-    return [
-        tuple(message and message.payload for message in each.messages) for each, _ in left if isinstance(each, Match)
-    ]
-
-
 def test_keys_need_a_required_input():
     with pytest.raises(ValueError, match="required"):
         lidars(policy=EqualKey(n_inputs=3, queue_size=10))
@@ -70,44 +63,6 @@ def test_keys_need_a_required_input():
 def half_of_slop(tolerances):
     """How far each input's stamps may be off."""
     return [SLOP // 2 if each is None else each for each in tolerances]
-
-
-def test_two_are_in_a_set_where_they_are_no_farther_apart_than_both_may_be_off():
-    together = {True: 0, False: 0}
-    for seed in range(WORLDS):
-        rng = random.Random(seed)
-        tolerances = [rng.choice((None, 0, 2 * MS, 5 * MS, 9 * MS)) for _ in range(2)]
-        room = sum(half_of_slop(tolerances))
-        stamps = [
-            (START + turn * PERIOD, START + turn * PERIOD + rng.choice((room, room + 1, rng.randrange(SLOP))))
-            for turn in range(20)
-        ]
-        if rng.random() < 0.5:
-            stamps = [(other, one) for one, other in stamps]
-        sent = [
-            Scan(index, turn, both[index], both[index] + 5 * MS) for turn, both in enumerate(stamps) for index in (0, 1)
-        ]
-        are_near = [abs(one - other) <= room for one, other in stamps]
-        sets = turns_of(played(lidars(2, 1, tolerances=tolerances), sent))
-        whole = [turns for turns in sets if None not in turns]
-        assert whole == [(turn, turn) for turn, near in enumerate(are_near) if near], f"seed {seed}, {tolerances}"
-        for near in are_near:
-            together[near] += 1
-    assert min(together.values()) > WORLDS, together
-
-
-def test_one_joins_only_what_it_goes_with_all_of():
-    # The first may be 2 ms off, the others 10: each is near enough to the first, which the set is made round.
-    stamps = (0, -9 * MS, 10 * MS)
-    sent = [Scan(index, 0, START + stamp, START + 20 * MS + index) for index, stamp in enumerate(stamps)]
-    assert turns_of(played(lidars(tolerances=[2 * MS, None, None]), sent)) == [(0, 0, 0)]
-    assert turns_of(played(lidars(tolerances=[2 * MS, 8 * MS, None]), sent)) == [(0, 0, None)]
-
-
-def test_a_tolerance_of_half_of_slop_or_more_changes_nothing():
-    sent = [Scan(0, 0, START, START), Scan(1, 0, START + SLOP, START + SLOP), Scan(2, 0, START - 1, START + SLOP)]
-    for wide in (SLOP // 2, SLOP, PERIOD):
-        assert turns_of(played(lidars(tolerances=[wide] * 3), sent)) == turns_of(played(lidars(), sent))
 
 
 def drawn_world(rng):

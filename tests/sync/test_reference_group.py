@@ -24,6 +24,7 @@ def drawn(rng, policy):
     quorum = rng.randint(max(1, sum(required)), n_inputs)
     quorum = rng.choice((quorum, sum(required) or quorum))
     has_tolerances = policy.startswith("approximate") and rng.random() < (0.4 if any(required) else 0.8)
+    restamps = (None, Restamp.EARLIEST, Restamp.LATEST, rng.randrange(n_inputs))
     may_wait_forever = all(required) or policy in ("latest_time", *BY_CLOCK)
     return Options(
         required=tuple(required),
@@ -36,7 +37,7 @@ def drawn(rng, policy):
         tolerances=tuple(rng.choice((None, 0, 1, 1.5, 2)) for _ in required) if has_tolerances else (),
         max_wait=rng.choice((*[None] * may_wait_forever, 0, 3, 8)),
         offsets=rng.choice(((), tuple(rng.randrange(-5, 6) for _ in required))),
-        restamp=rng.choice((None, Restamp.EARLIEST, Restamp.LATEST, rng.randrange(n_inputs))),
+        restamp=rng.choice((*restamps, Restamp.TICK) if policy in BY_CLOCK else restamps),
         every=rng.choice((1, 1, 2, 3)),
         min_set_period=rng.choice((None, None, 1, 4)),
     )

@@ -186,6 +186,8 @@ class ReferenceGroup:
         chosen = None if not isinstance(self.restamp, int) else match.messages[self.restamp]
         if self.restamp is None:
             return match
+        if self.restamp is Restamp.TICK:
+            return replace(match, stamp=match.tick)
         if chosen is not None:
             return replace(match, stamp=chosen.stamp)
         return replace(match, stamp=max(stamps) if self.restamp is Restamp.LATEST else min(stamps))
