@@ -6,7 +6,6 @@ from collections import deque
 import pytest
 
 from syncrelay.explain.input_observation import InputObservation
-from syncrelay.explain.rhythm import Burst, bursts
 from tests.explain.support.groups import MS, S
 
 
@@ -17,16 +16,6 @@ def _stream(first, last, *, period=10 * MS):
 def _held(first, last, *, period=10 * MS):
     """Messages of a stretch of time that all come at its end."""
     return [(stamp, last + n * MS // 10) for n, stamp in enumerate(range(first, last, period))]
-
-
-def test_messages_that_come_at_once_after_a_pause_are_a_burst():
-    arrivals = _stream(S, 2 * S) + _held(2 * S, 3 * S) + _stream(3 * S + 20 * MS, 4 * S)
-    assert list(bursts(arrivals)) == [Burst(3 * S, 999 * MS)]
-
-
-def test_every_burst_is_found():
-    arrivals = [each for second in range(1, 5) for each in _held(second * S, (second + 1) * S)]
-    assert [burst.at for burst in bursts(arrivals)] == [3 * S, 4 * S, 5 * S]
 
 
 @pytest.mark.parametrize("seed", range(20))

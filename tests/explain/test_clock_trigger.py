@@ -25,29 +25,6 @@ def last_of(told: Told) -> Finding:
     return explanation(with_ok(told.facts, told.found[-1][1]))
 
 
-def test_a_group_that_is_well_runs_at_the_rate_of_its_clock():
-    finding = last_of(ran(Source("/lidar", hz=10, delay_ms=20)))
-    assert finding.code is Code.HEALTHY
-    assert finding.text.startswith("30 of 30 ")
-
-
-def test_an_input_that_stopped_is_why_no_set_leaves():
-    finding = last_of(ran(Source("/lidar", hz=10, sends=lambda second: second < 10), seconds=20, max_age="500ms"))
-    assert (finding.code, finding.severity, finding.input) == (Code.SILENT, Severity.ERROR, 1)
-
-
-@pytest.mark.parametrize(
-    ("max_age", "severity"), [("20ms", Severity.ERROR), ("50ms", Severity.WARN)], ids=["at every tick", "at some"]
-)
-def test_messages_that_are_too_old_at_ticks_are_found_and_the_value_that_is_told_cures(max_age, severity):
-    lidar = Source("/lidar", hz=10, delay_ms=30)
-    finding = last_of(ran(lidar, max_age=max_age))
-    assert (finding.code, finding.severity) == (Code.OVER_SLOP, severity)
-    assert "/lidar is 30 ms to 130 ms" in finding.text
-    assert "`max_age: 180ms`" in (finding.suggestion or "")
-    assert last_of(ran(lidar, max_age="180ms")).code is Code.HEALTHY
-
-
 @pytest.mark.parametrize("trigger", ["30 Hz", "/camera"])
 def test_an_input_that_is_too_old_for_its_own_age_is_found_and_the_value_that_is_told_cures(trigger):
     def with_map(max_age: str) -> Finding:

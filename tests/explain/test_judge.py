@@ -82,14 +82,6 @@ def test_nothing_is_remarkable_of_a_healthy_group_but_what_is_well():
     assert {each.severity for each in judge(FOUND["stamps that fell"])} == {Severity.OK}
 
 
-def test_a_required_input_is_blamed_before_an_optional_one():
-    stranger = {"publishers": (STRANGER,)}
-    group = a_silent_group(camera(required=False, **stranger), an_input("/lidar", **stranger))
-    first, second = found_in(group)[:2]
-    assert (first.input, first.severity) == (1, Severity.ERROR)
-    assert (second.input, second.severity) == (0, Severity.WARN)
-
-
 def test_an_explanation_is_the_first_of_the_worst():
     ok, warn, error, worse = (
         Finding(Code.TIME_JUMP, Severity.OK, "a"),
@@ -99,7 +91,3 @@ def test_an_explanation_is_the_first_of_the_worst():
     )
     assert explanation((ok, warn, error, worse)) is error
     assert explanation((ok, warn)) is warn
-
-
-def test_an_explanation_of_nothing_bad_is_the_last_word():
-    assert explanation(found_in(FOUND["stamps that fell"])).code is Code.HEALTHY

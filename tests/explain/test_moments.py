@@ -13,14 +13,12 @@ from typing import Any
 import pytest
 
 from syncrelay.config import GroupConfig
-from syncrelay.explain import Code, judge, words
 from syncrelay.explain.changes import Change, changed
 from syncrelay.explain.dry_run import EngineDriver
 from syncrelay.explain.nearest import as_arrays, possible_sets
 from syncrelay.explain.trials import REQUIRED, Trials
 from syncrelay.sync import DropReason, Match, Message, Outcome
 from tests.explain.scenario import BEGAN, MS, Source, group_of
-from tests.explain.support.groups import a_group, a_silent_group, an_input
 from tests.faults.extent import chosen
 
 
@@ -158,59 +156,6 @@ def test_the_offset_that_is_found_is_by_how_much_one_clock_was_ahead():
         moved = trials.by_offset(next(iter(offsets)))
         assert moved is not None, told
         assert moved.given >= moved.possible - 1 >= len(first) - 2, told
-
-
-def test_of_several_clocks_the_odd_one_is_told():
-    for seed in range(chosen(short=60, long=2000)):
-        chance = random.Random(f"odd {seed}")
-        n_inputs = chance.choice([2, 3, 4])
-        odd, usual = chance.randrange(n_inputs), 5 * MS if n_inputs == 2 else chance.choice([5 * MS, 50_000 * MS])
-        by, offset = chance.choice([-1, 1]) * chance.randint(1200, 90_000) * MS, chance.choice([0, 700]) * MS
-        delays = [usual + offset + (by if index == odd else 0) for index in range(n_inputs)]
-        inputs = [an_input(f"/{n}", offset=offset, figures={"delay": delay}) for n, delay in enumerate(delays)]
-        (found,) = [each for each in judge(a_silent_group(*inputs)) if each.code is Code.OTHER_CLOCK]
-        assert found.input == odd, (seed, delays)
-        apart = f"are {words.span_of_time(abs(by))} {'behind' if by > 0 else 'ahead of'} those of "
-        assert f"{apart}{'the other inputs' if n_inputs > 2 else f'/{1 - odd}'}" in found.text, (
-            seed,
-            delays,
-            found.text,
-        )
-
-
-def test_a_constant_distance_is_told_where_messages_of_two_moments_are_paired():
-    for seed in range(chosen(short=60, long=2000)):
-        chance = random.Random(f"constant {seed}")
-        odd, by = chance.choice([0, 1]), chance.choice([-1, 1]) * chance.choice([chance.randint(8, 1000), 52, 60, 115])
-        rig = drawn(
-            chance, "approximate_time", lost=0, jitter=0, ahead=[by * MS if index == odd else 0 for index in (0, 1)]
-        )
-        stamps = [[each.stamp for each in rig.messages if each.input == index] for index in (0, 1)]
-        delays = [[each.payload - each.stamp for each in rig.messages if each.input == index] for index in (0, 1)]
-        period = stamps[0][1] - stamps[0][0]
-        figures = [
-            {"stamps": own, "delays": late, "delay": late[0], "pace_hz": 1e9 / period}
-            for own, late in zip(stamps, delays, strict=True)
-        ]
-        facts = a_group(
-            *(an_input(f"/{name}", offset=rig.offsets[n], figures=figures[n]) for n, name in enumerate("ab"))
-        )
-        near = abs(by * MS - round(by * MS / period) * period)
-        delay, other_delay = (each[0] - rig.offsets[n] for n, each in enumerate(delays))
-        if 2 * near == period or abs(delay - other_delay) > 1000 * MS:
-            continue
-        # A result has the stamp of what it is of, which may be long ago. None is of what is to come.
-        is_early = max(delay, other_delay, key=abs) <= -period / 4
-        found = [each for each in judge(facts) if each.code is Code.CONSTANT_OFFSET]
-        told = f"seed {seed}: {odd} by {by} ms of {period}: {found}"
-        assert bool(found) is (2 * abs(by) * MS >= period and (near >= 0.15 * period or is_early)), told
-        for each in found:
-            side = "ahead of" if by > 0 else "behind"
-            assert each.text.startswith(f"stamps of /{'ab'[odd]} are always {words.duration(abs(by) * MS)} {side}"), (
-                told
-            )
-            assert f"`offset: {words.exactly(rig.offsets[odd] - by * MS)}` at" in str(each.suggestion), told
-            assert each.input == odd, told
 
 
 @pytest.mark.parametrize("policy", ["approximate_time", "approximate_time_eager"])

@@ -86,25 +86,6 @@ def test_a_message_is_in_one_possible_set_at_most_the_tightest():
     assert ((found.stamps - BEGAN) // MS).tolist() == [at for at in sorted(slow) if at != 500]
 
 
-def test_a_message_is_measured_once_something_on_every_input_is_not_older():
-    nearest = NearestSpans(2)
-    assert nearest.add([[100], []], pivot=0) == []
-    assert nearest.add([[], [90]], pivot=0) == []
-    assert nearest.add([[], [104]], pivot=0) == [4]
-    assert nearest.add([[], [110]], pivot=0) == []
-
-
-def test_slow_inputs_that_never_come_in_one_chunk_are_measured():
-    nearest = NearestSpans(2)
-    spans = [
-        span
-        for n in range(10)
-        for first, second in (([n * 100], list[int]()), (list[int](), [n * 100 + 30]))
-        for span in nearest.add([first, second], pivot=0)
-    ]
-    assert spans == [30] * 9
-
-
 def test_after_clearing_nothing_of_before_counts():
     nearest = NearestSpans(2)
     nearest.add([[100], [101]], pivot=0)

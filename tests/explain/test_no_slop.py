@@ -39,16 +39,3 @@ def test_one_that_dies_is_told(dead):
     told = run(Source(alive, 10, **NOISE), dying, seconds=30, options=OPTIONS)
     assert told.codes == {"silent"}
     assert told.facts.standing is Standing.NONE
-
-
-def test_an_optional_input_joins_from_any_distance():
-    far = Source("/imu", 10, required=False, clock=lambda _: 0.04, **NOISE)
-    told = run(
-        Source("/camera", 10, **NOISE),
-        Source("/lidar", 10, **NOISE),
-        far,
-        seconds=30,
-        options={**OPTIONS, "max_wait": "100ms"},
-    )
-    assert told.facts.figures.missing[2] < 0.05
-    assert told.facts.standing is Standing.ENOUGH

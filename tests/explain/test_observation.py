@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from operator import add
 from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -70,39 +69,8 @@ def test_stamps_that_repeat_and_fall_a_little_are_counted_while_the_window_lasts
     assert (stage.inputs[0].duplicates, stage.inputs[0].out_of_order) == (0, 0)
 
 
-def test_how_near_messages_were_is_forgotten_with_the_pace_of_an_input():
-    stage = Stage()
-    for hz, shift in (*[(20, 0)] * 20, *[(2, 30 * MS)] * 12):
-        stage.second(stage.stream(hz), stage.stream(hz, shift=shift))
-    assert stage.inputs[0].slowed_from_hz is not None
-    assert set(stage.group.nearest.values) == {30 * MS}
-
-
 def a_set(stage, *, span=5 * MS, latency=MS, second=True):
     return (stage.now, stage.now + span if second else None), latency
-
-
-def test_a_clock_that_is_set_back_is_borne():
-    stage = Stage()
-    for _ in range(20):
-        stage.second(stage.stream(10), sets=[a_set(stage)])
-    stage.second(length=-3600 * S)
-    group = stage.group
-    assert group.began <= group.now
-    assert group.last_set == group.now
-    for _ in range(20):
-        stage.second(stage.stream(10))
-    assert stage.inputs[0].rate_hz == pytest.approx(10)
-    assert stage.group.now - stage.group.last_set == 20 * S
-
-
-def test_spans_count_offsets_in_looks_with_and_without_incomplete_sets():
-    whole, incomplete = (BEGAN, BEGAN + 12 * MS, BEGAN + 3 * MS), (BEGAN, BEGAN + 12 * MS, None)
-    stage = Stage(3, offsets=[0, -10 * MS, 0], required=[True, True, False])
-    stage.second(sets=[(whole, MS), (whole, MS)])
-    stage.second(sets=[(whole, MS), (incomplete, MS)])
-    assert stage.group.last_sets == ((2 * MS, MS), (3 * MS, MS), (3 * MS, MS), (3 * MS, MS))
-    assert stage.group.missing == (0, 0, 0.25)
 
 
 _STAMPS = st.lists(st.sampled_from([0, *range(BEGAN, BEGAN + 20)]), min_size=1, max_size=12)

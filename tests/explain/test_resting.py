@@ -1,7 +1,5 @@
 """What is said of a relay that is paused, and of a lazy group that sleeps: what is wrong while it works, alone."""
 
-import pytest
-
 from syncrelay.explain import Code, Endpoint
 from tests.explain.scenario import IMU, Noise, Source, Told, run
 
@@ -22,20 +20,6 @@ def test_a_silence_that_begins_in_a_pause_is_told_after_it():
     assert not any("recovered" in line.text for line in told.lines)
 
 
-def test_a_pause_is_no_recovery_of_what_was_silent_before_it():
-    gone = Source("/lidar", hz=10, sends=lambda second: not 20 < second < 80)
-    told = run(_CAMERA, gone, seconds=120, options=_SLOP, paused=[(40, 60)])
-    # It is over when the share of the last 10 s is what it was.
-    assert [line.second for line in told.lines if "recovered" in line.text] == pytest.approx([90], abs=1)
-
-
-def test_stamps_that_were_unset_before_a_pause_are_not_said_to_be_mended_by_it():
-    unset = Source("/lidar", hz=10, stamp=lambda _: 0)
-    told = run(_CAMERA, unset, seconds=90, options=_SLOP, paused=[(30, 60)])
-    assert {line.code for line in told.lines} == {"unstamped"}
-    assert not any("resolved" in line.text or "recovered" in line.text for line in told.lines)
-
-
 def lazy(*sources: Source, sleeps, seconds=120, **keys) -> Told:
     options = {"lazy": True, "slop": "30ms", **keys.pop("options", {})}
     return run(*sources, seconds=seconds, options=options, sleeps=sleeps, **keys)
@@ -49,32 +33,6 @@ def test_what_happens_while_it_sleeps_is_no_news_when_it_wakes():
 
     slower = Source("/lidar", 10, hz_at=lambda second: 10 if second < 40 else 5, clock=set_back, **REAL)
     assert lazy(Source("/camera", 30, clock=set_back, **REAL), slower, sleeps=[(30, 60)]).lines == []
-
-
-def test_a_publisher_that_fell_silent_meanwhile_is_told_once_it_wakes():
-    told = lazy(
-        Source("/camera", 30, **REAL), Source("/lidar", 10, sends=lambda second: second < 40, **REAL), sleeps=[(30, 60)]
-    )
-    assert told.codes == {"silent"}
-    assert 65 <= told.first.second <= 67
-
-
-def test_a_silence_that_was_told_is_not_over_because_nobody_listens():
-    told = lazy(
-        Source("/camera", 30, **REAL),
-        Source("/lidar", 10, sends=lambda second: not 20 < second < 70, **REAL),
-        sleeps=[(30, 80)],
-    )
-    assert [each.code for each in told.lines] == ["silent"]
-
-
-def test_a_warning_that_was_told_is_not_resolved_because_nobody_listens():
-    told = lazy(
-        Source("/camera", 30, **REAL),
-        Source("/lidar", 10, hz_at=lambda second: 10 if second < 20 else 4, **REAL),
-        sleeps=[(45, 90)],
-    )
-    assert [(each.code, each.warns) for each in told.lines] == [("slowed", True)]
 
 
 def test_who_is_not_there_is_told_though_nobody_listens():

@@ -137,8 +137,7 @@ def test_of_a_healthy_group_nothing_is_said_however_many_frames_are_surplus(seed
     assert "healthy" in {each.code.value for each in with_ok(told.facts, told.found[-1][1])}, str(drawn)
 
 
-@pytest.mark.parametrize("hz", [1.0, 10.0])
-@pytest.mark.parametrize("every_s", [6, 12, 30])
+@pytest.mark.parametrize(("hz", "every_s"), [(1.0, 30), (10.0, 12)])
 def test_one_stray_set_changes_no_state_and_is_no_recovery(hz, every_s):
     camera = Source("/camera", hz)
     lidar = Source("/lidar", hz, clock=lambda second: 0.0 if round(second * hz) % (every_s * hz) == 0 else 0.4 / hz)

@@ -1,7 +1,6 @@
 """Suggestions: each was tried on the messages that came, cures what it is said of, and gives what it promises."""
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -69,12 +68,6 @@ CAMERA = Source("/camera", hz=10, jitter_ms=0.5)
 LIDAR = Source("/lidar", hz=10, jitter_ms=0.5)
 
 
-def test_a_slop_is_suggested_with_the_longer_queue_that_it_needs():
-    told, cured = rig(replace(CAMERA, phase_ms=30), replace(LIDAR, delay_ms=900), slop="10ms", queue_size=5)
-    assert re.search(r"write `slop: \w+` and `queue_size: \d+`, which would give", told.first.text)
-    assert_cured(cured[:1], offered=1)
-
-
 def test_an_offset_is_offered_beside_the_slop_where_the_distance_is_constant():
     told, cured = rig(replace(CAMERA, hz=5, clock=lambda _: -0.08), replace(LIDAR, hz=5), slop="20ms")
     assert re.search(
@@ -83,19 +76,6 @@ def test_an_offset_is_offered_beside_the_slop_where_the_distance_is_constant():
         told.first.text,
     )
     assert_cured(cured, offered=2)
-
-
-def test_no_slop_that_would_pair_wrong_frames_is_suggested():
-    _, cured = rig(replace(CAMERA, clock=lambda _: -0.08), LIDAR, slop="10ms")
-    assert {key for finding, _, _ in cured for ((key, _, _),), _ in offers(finding)} == {"offset"}
-    assert_cured(cured, offered=2)
-
-
-def test_no_slop_is_suggested_where_a_partner_is_missing():
-    lidar = replace(LIDAR, sends=lambda second: round(second * 10) % 4 != 0)
-    told, cured = rig(Source("/imu", hz=10), replace(lidar, jitter_ms=0), CAMERA, slop="20ms")
-    assert cured == []
-    assert all("`slop" not in line.text for line in told.warnings)
 
 
 def test_a_longer_queue_is_offered_for_stamps_that_seem_old_only_if_it_cures():
@@ -110,51 +90,6 @@ def test_a_longer_queue_is_offered_for_stamps_that_seem_old_only_if_it_cures():
     # Stamps that are never within slop are not cured by a queue.
     apart, _ = rig(replace(CAMERA, phase_ms=50), replace(LIDAR, delay_ms=2500), slop="10ms", queue_size=5)
     assert "queue_size" not in "".join(each.suggestion or "" for _, found in apart.found for each in found)
-
-
-def test_no_offset_is_offered_for_another_clock_whose_stamps_would_not_match_by_it():
-    wandering = Source("/lidar", hz=10, jitter_ms=30, clock=lambda _: 5.25)
-    told, cured = rig(CAMERA, wandering, slop="2ms")
-    assert told.codes == {"other_clock"}
-    assert told.first.text.endswith("synchronize the clocks of their machines")
-    assert cured == []
-
-
-def drifting(ppm: float) -> Callable[[float], float]:
-    return lambda second: second * ppm * 1e-6
-
-
-@pytest.mark.parametrize("ppm", [-800, 800])
-def test_a_clock_that_drifts_is_offered_to_be_mapped_and_then_no_set_is_lost(ppm: int):
-    imu = Source("/imu", hz=10, delay_jitter_ms=0.5, clock=drifting(ppm))
-    told, cured = rig(CAMERA, LIDAR, imu, seconds=40, slop="12ms")
-    assert told.codes == {"clock_drift"}
-    assert told.facts.figures.share.left < told.facts.figures.share.possible
-    assert [values for values, _ in offers(cured[0][0])] == [[("clock", "device", "/imu")]]
-    assert_cured(cured, offered=1)
-
-
-def test_stamps_that_count_from_boot_are_offered_to_be_mapped_with_the_delay_that_they_then_have():
-    imu = Source("/imu", hz=10, delay_ms=42, delay_jitter_ms=0.5, stamp=lambda stamp: stamp - BEGAN + 300 * S)
-    told, cured = rig(CAMERA, LIDAR, imu, slop="5ms")
-    assert told.codes == {"other_clock"}
-    (((clock, delay), _),) = offers(cured[0][0])
-    assert clock == ("clock", "device", "/imu")
-    assert delay[0::2] == ("delay", "/imu")
-    assert 39 < float(delay[1].removesuffix("ms")) < 43
-    assert_cured(cured, offered=1)
-
-
-def test_an_offset_is_kept_where_it_is_known_and_a_clock_that_was_set_is_offered_to_be_mapped():
-    constant, _ = rig(CAMERA, LIDAR, Source("/imu", hz=10, clock=lambda _: 5.25), slop="20ms")
-    assert "write `offset: -5.25s` at /imu, which would give" in (constant.found[-1][1][0].suggestion or "")
-    _, cured = rig(CAMERA, LIDAR, Source("/imu", hz=10, clock=lambda s: 5.25 * (s > 15)), slop="20ms")
-    assert {each for finding, _, _ in cured for values, _ in offers(finding) for each in values} == {
-        ("clock", "device", "/imu"),
-        # As long as its messages took before.
-        ("delay", "5ms", "/imu"),
-    }
-    assert_cured(cured, offered=1)
 
 
 def test_a_clock_whose_least_delay_decides_what_matches_is_not_offered_to_be_mapped_but_the_delay_is_asked_for():
@@ -177,22 +112,6 @@ def test_a_clock_whose_least_delay_decides_what_matches_is_not_offered_to_be_map
     assert_cured(cured, offered=2)
 
 
-def test_stamps_that_seem_old_are_not_moved_where_no_window_is_long_enough_to_try_a_queue():
-    """At 1 kHz, messages of 2 s are tried, and those of the lidar may be of 3 s ago."""
-    quick = Source("/camera", hz=1000, delay_ms=0.5)
-    told, cured = rig(quick, Source("/lidar", hz=1000, delay_ms=3000), seconds=12, slop="10ms", queue_size=5)
-    assert told.codes == {"other_clock"}
-    assert cured == []
-
-
-def test_a_clock_that_wanders_is_offered_to_be_mapped_before_a_slop_that_would_not_hold():
-    wanders = Source("/imu", hz=10, clock=lambda second: 0.0014 * (second - 20))
-    told, _ = rig(CAMERA, LIDAR, wanders, seconds=7, slop="4ms")
-    assert told.found[-1][1][0].code is Code.OVER_SLOP
-    ((((clock), *_), _),) = offers(told.found[-1][1][0])
-    assert clock == ("clock", "device", "/imu")
-
-
 def test_stamps_that_were_never_set_or_cannot_be_read_stay_so_where_the_others_are_tried_as_mapped():
     config = group_of([CAMERA, LIDAR], {"slop": "5ms"})
     camera = [Message(0, NOW + n * 100 * MS, NOW + n * 100 * MS + 5 * MS) for n in range(100)]
@@ -205,19 +124,6 @@ def test_stamps_that_were_never_set_or_cannot_be_read_stay_so_where_the_others_a
     assert found.changes == (Change("clock", "device", 1), Change("delay", "42ms", 1))
     # Of the first and the last, it is not known whether a partner is still to come.
     assert found.given == found.possible == 97
-
-
-def test_times_of_receipt_are_not_offered_where_mapped_stamps_do():
-    """The mapped stamps lie 4.2 ms before the camera's, near the slop, and most times of receipt nearer."""
-    config = group_of([CAMERA, LIDAR], {"slop": "5ms"})
-    camera = [Message(0, NOW + n * 100 * MS, NOW + n * 100 * MS + 5 * MS) for n in range(100)]
-    received = [NOW + n * 100 * MS - (42 if n % 25 == 0 else 27) * MS // 10 for n in range(100)]
-    lidar = [Message(1, 300 * S + n * 100 * MS, at) for n, at in enumerate(received)]
-    messages = sorted([*camera, *lidar], key=lambda each: each.payload)
-    trials = Trials(config, lambda: messages, as_arrays(messages, 2), is_window=True)
-    assert by_other_stamps(trials, 1, keys=["stamp"]).tried
-    (found,) = by_other_stamps(trials, 1).tried
-    assert found.changes == (Change("clock", "device", 1),)
 
 
 def test_a_slop_is_not_narrowed_to_how_near_mapped_stamps_came():
@@ -236,13 +142,6 @@ def test_a_slop_is_not_narrowed_to_how_near_mapped_stamps_came():
     assert plan(replace(LIDAR, topic_options={"clock": "device"})) == []
 
 
-@pytest.mark.parametrize("stamp", [lambda stamp: BEGAN + (stamp - BEGAN) // 2, lambda stamp: stamp // S * S])
-def test_a_clock_that_cannot_be_followed_is_not_offered_to_be_mapped(stamp):
-    told, _ = rig(CAMERA, LIDAR, Source("/imu", hz=10, stamp=stamp), slop="20ms")
-    assert told.warnings
-    assert "clock: device" not in "".join(each.suggestion or "" for _, found in told.found for each in found)
-
-
 def test_times_of_receipt_are_offered_only_where_they_bring_the_sets():
     halved = Source("/imu", hz=10, stamp=lambda stamp: BEGAN + (stamp - BEGAN) // 2)
     told, cured = rig(CAMERA, LIDAR, halved, slop="20ms")
@@ -251,19 +150,6 @@ def test_times_of_receipt_are_offered_only_where_they_bring_the_sets():
     late, none = rig(CAMERA, LIDAR, replace(halved, delay_ms=45), slop="20ms")
     assert late.codes == told.codes
     assert none == []
-
-
-def test_an_optional_input_of_another_clock_that_drifts_is_offered_to_be_mapped():
-    imu = Source("/imu", hz=10, required=False, clock=lambda second: 5.25 + 1.2e-3 * second)
-    _, cured = rig(CAMERA, LIDAR, imu, slop="5ms", max_wait="100ms")
-    assert [offers(finding)[0][0] for finding, _, _ in cured] == [[("clock", "device", "/imu")]]
-
-
-def test_an_offset_is_offered_for_an_optional_input_of_another_clock():
-    imu = Source("/imu", hz=10, required=False, clock=lambda _: 5.25)
-    _, cured = rig(CAMERA, LIDAR, imu, slop="20ms", max_wait="100ms")
-    assert [offers(finding) for finding, _, _ in cured] == [[([("offset", "-5.25s", "/imu")], cured[0][2])]]
-    assert_cured(cured, offered=1)
 
 
 def a_suggester(budget: TryBudget | None = None) -> Suggester:
@@ -280,10 +166,6 @@ def wider(trials: Trials) -> Verdict:
 
 def nothing(_: Trials) -> Verdict:
     return Verdict(())
-
-
-def test_what_was_tried_says_what_it_gives():
-    assert a_suggester().ask("a", wider, now=BEGAN).tried == (Tried((Change("slop", "30ms"),), 58, 0, 59),)
 
 
 def test_what_was_tried_is_not_tried_again_at_once():
@@ -388,23 +270,6 @@ def test_what_was_never_tried_comes_before_what_was():
     assert other.ask("a", wider, now=BEGAN + 2000 * MS).tried != ()
     budget.refill()
     assert asked.ask("a", nothing, now=BEGAN + 3000 * MS).tried == ()
-
-
-def test_an_offset_is_found_where_each_stamp_comes_three_times():
-    stamps = [BEGAN + number * 100 * MS for number in range(60)]
-    config = group_of([CAMERA, LIDAR], {"slop": "20ms"})
-    arrivals = [
-        [(stamp, stamp + 45 * MS) for stamp in stamps],
-        [(stamp + 30 * MS, stamp + (40 + nth) * MS) for stamp in stamps for nth in range(3)],
-    ]
-    came = sorted((received, index, stamp) for index, each in enumerate(arrivals) for stamp, received in each)
-    messages = [Message(index, stamp, received) for received, index, stamp in came]
-    trials = Trials(config, lambda: messages, as_arrays(messages, 2), is_window=True)
-    assert list(trials.offsets()) == [Change("offset", "30ms", 0)]
-
-
-def test_what_does_not_help_is_not_offered():
-    assert a_suggester().ask("a", lambda trials: trials.verdict(REQUIRED, {"queue_size"}), now=BEGAN).tried == ()
 
 
 _RATES = st.sampled_from([1, 2, 5, 7, 10, 15, 20, 30, 50, 100, 200])

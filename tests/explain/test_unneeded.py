@@ -62,12 +62,6 @@ def test_where_a_clock_makes_the_sets_only_what_gave_way_to_a_newer_message_is_n
     assert (fates.unneeded, fates.others, other.unneeded) == (20, {DropReason.EXPIRED: 3}, 0)
 
 
-def test_what_is_left_is_the_most_telling():
-    camera = {DropReason.SUPERSEDED: 5, DropReason.TOO_FAR: 4, DropReason.OVERFLOW: 3}
-    fates, _ = drop_fates([camera, {DropReason.TOO_FAR: 4}], (0, 1))
-    assert fates.others == {DropReason.OVERFLOW: 3, DropReason.TOO_FAR: 1}
-
-
 @dataclass(frozen=True)
 class Rig:
     """A camera and a slow lidar. So many of the lidar's messages have no partner: the camera pauses round them."""

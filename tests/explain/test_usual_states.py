@@ -59,20 +59,6 @@ def test_an_optional_input_that_is_away_is_a_warning_for_a_minute_and_one_line(s
     assert any("/imu" in each.text for _, found in told.found[-1:] for each in found), case
 
 
-def test_one_that_comes_back_is_resolved_and_its_next_absence_is_news():
-    sends = lambda second: not (10 <= second < 100 or second >= 190)  # noqa: E731
-    told, levels = _levels(
-        Source("/camera", hz=10),
-        Source("/lidar", hz=5, phase_ms=20),
-        Source("/imu", hz=10, required=False, sends=sends),
-        seconds=215,
-        options=_POLICIES[0],
-    )
-    assert [line.warns for line in told.lines] == [True, False, True], told.lines
-    assert levels[95] is Level.OK
-    assert levels[210] is Level.WARN
-
-
 @pytest.mark.parametrize("seed", _SEEDS)
 def test_a_recording_that_is_played_in_a_loop_is_no_warning(seed: int):
     chance = random.Random(seed)
