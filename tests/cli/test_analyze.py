@@ -1,6 +1,4 @@
 import json
-import random
-import re
 import shlex
 import sys
 
@@ -84,28 +82,6 @@ def test_the_written_file_gives_what_was_promised_and_leaves_nothing_to_change(f
     assert not new.exists()
 
 
-def test_a_clock_that_drifts_is_suggested_to_be_mapped_and_then_gives_the_sets(tmp_path):
-    """A camera and a device, which is received 6 to 9 ms after it measured."""
-    chance = random.Random(1)
-    camera = at("/camera", *(n * 100 for n in range(600)))
-    sent = [(n * 100, BEGIN + round((n * 100 + 6 + 3 * chance.random()) * MS)) for n in range(600)]
-    lidar = [Frame("/lidar", VECTOR, received, vector(BEGIN + round(ms * (1 - 400e-6) * MS))) for ms, received in sent]
-    bag, written = write_mcap(tmp_path / "device.mcap", merged(camera, lidar)).name, str(tmp_path / "better.yaml")
-    group = {"policy": "approximate_time", "slop": "15ms", "topics": inputs(dict.fromkeys(_TOPICS, VECTOR))}
-    (tmp_path / "f.yaml").write_text(config({"front": group}))
-    done = run_here("analyze", bag, "--config", "f.yaml", "--write", written, folder=tmp_path)
-    assert done.returncode == 0
-    assert "        - topic: /lidar\n            clock: device\n" in done.stdout
-    assert ", or write `clock: device` at /lidar, which would give " in done.stdout
-    assert run_here("validate", written, folder=tmp_path).returncode == 0
-    replayed = run_here("replay", bag, "--config", written, folder=tmp_path)
-    promised = re.search(r"suggestion: \d+ -> (\d+) of", done.stdout)
-    assert promised
-    assert read_summary(replayed.stdout)["front"].sets >= int(promised[1]) > 590
-    mended = run_here("analyze", bag, "--config", written, folder=tmp_path)
-    assert "suggestion: none, no better values were found" in mended.stdout
-
-
 def test_topics_without_a_file_get_one(folder, tmp_path):
     written = tmp_path / "new.yaml"
     done = run_here("analyze", "rig.mcap", *_TOPICS, "--write", str(written), folder=folder)
@@ -165,25 +141,6 @@ def test_of_a_recording_with_nothing_to_match_no_command_is_shown(folder):
     assert (done.returncode, done.stderr) == (0, "")
     assert "equal to receipt" in done.stdout
     assert done.stdout.splitlines()[-1].startswith("No two topics have stamps and enough messages")
-
-
-def test_keys_that_no_two_inputs_have_in_common_are_found(folder):
-    frames = [
-        Frame(f"/{name}", VECTOR, BEGIN + n * 100 * MS, vector(BEGIN + n * 100 * MS, frame_id=f"{name}_{n}"))
-        for n in range(100)
-        for name in ("left", "right")
-    ]
-    write_mcap(folder / "keys.mcap", frames)
-    topics = inputs(dict.fromkeys(("/left", "/right"), VECTOR))
-    (folder / "keys.yaml").write_text(
-        config({"seen": {"policy": "equal_key", "key": "header.frame_id", "topics": topics}})
-    )
-    done = run_here("analyze", "keys.mcap", "--config", "keys.yaml", "--json", folder=folder)
-    (group,) = json.loads(done.stdout)["groups"]
-    (found,) = (finding for finding in group["findings"] if finding["code"] == "no_common_key")
-    assert "'left_" in found["text"]
-    # It explains the silence, which the others only describe.
-    assert group["findings"][0] == found
 
 
 def test_several_recordings_are_measured_one_after_another_and_a_faulty_one_ends_no_other(folder, monkeypatch):

@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import sys
+from itertools import cycle
 from pathlib import Path
 
 import pytest
@@ -72,7 +73,7 @@ _TERM, _INT = signal.SIGTERM, signal.SIGINT
 @pytest.mark.parametrize(
     ("where", "since", "first", "second"),
     [
-        *((where, "deferred", number, number) for where in _ANYWHERE for number in (_TERM, _INT)),
+        *((where, "deferred", number, number) for where, number in zip(_ANYWHERE, cycle((_TERM, _INT)))),
         *((where, "running", _INT, _INT) for where in ("python", "library")),
         *(("python", since, _INT, _TERM) for since in ("deferred", "running")),
     ],

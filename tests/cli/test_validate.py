@@ -127,14 +127,6 @@ def test_github_gets_workflow_commands(folder, environ):
     assert missing == "::error file=missing.yaml::no such file"
 
 
-def test_github_takes_what_would_end_a_property_or_a_command(folder, environ):
-    (folder / "50%,a:b.yaml").write_text(GOOD.replace("exact_time", '"100%\\n::error::"'))
-    done = run_here("validate", "--format", "github", "50%,a:b.yaml", folder=folder, environ=environ)
-    (line,) = done.stdout.splitlines()
-    assert line.startswith("::error file=50%25%2Ca%3Ab.yaml,line=4,")
-    assert "found the string `100%25\\n::error::`" in line
-
-
 @pytest.mark.parametrize(
     ("variables", "coloured"),
     [({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True), ({"TERM": "dumb"}, False)],
@@ -143,10 +135,3 @@ def test_colour_is_for_terminals_that_want_it(variables, coloured, folder, envir
     code, shown = shown_on_terminal("validate", "f.yaml", folder=folder, **environ, **variables)
     assert (code, "unknown value" in shown) == (1, True)
     assert ("\033[" in shown) == coloured
-
-
-def test_a_name_that_the_terminal_cannot_show_is_escaped(folder, environ):
-    (folder / "good.yaml").rename(folder / "\udcff.yaml")
-    done = run("validate", "\udcff.yaml", folder=folder, environ={**environ, "PYTHONIOENCODING": "utf-8"})
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == "\\udcff.yaml: ok, 1 group, 2 topics\n"

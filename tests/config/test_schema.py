@@ -1,7 +1,6 @@
 """The schema that editors check by says what the models say."""
 
 import re
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -36,15 +35,7 @@ class Yaml12Loader(yaml.SafeLoader):
 Yaml12Loader.add_implicit_resolver("tag:yaml.org,2002:bool", re.compile("true|false"), ["t", "f"])
 
 
-def wrong_files():
-    """Files that are YAML, and wrong all the same."""
-    for file in sorted((HERE / "invalid").rglob("*.yaml")):
-        with suppress(yaml.YAMLError):
-            parsed(file)
-            yield file
-
-
-WRONG_FILES = list(wrong_files())
+WRONG_FILES = sorted((HERE / "invalid").rglob("*.yaml"))
 
 
 def test_the_schema_is_draft_7():
@@ -61,8 +52,12 @@ def test_a_good_file_is_good_by_the_schema(file):
 
 @pytest.mark.parametrize("file", WRONG_FILES, ids=lambda file: file.stem)
 def test_what_is_wrong_in_itself_is_wrong_by_the_schema(file):
+    try:
+        keys = parsed(file)
+    except yaml.YAMLError:
+        return  # a schema is asked about what can be parsed
     # No schema can tell how keys bear on each other, what is installed, what the environment holds.
-    assert VALIDATOR.is_valid(parsed(file)) == (file.parent.name == "by_no_schema"), "is the file in the right folder?"
+    assert VALIDATOR.is_valid(keys) == (file.parent.name == "by_no_schema"), "is the file in the right folder?"
 
 
 def test_every_key_is_in_the_schema_with_a_description():

@@ -99,22 +99,6 @@ def test_what_waits_in_a_group_that_is_stopped_is_dropped_and_counted(failing: s
     assert [each.buffered for each in (camera, lidar)] == [0, 0]
 
 
-def test_a_group_that_is_suspended_lets_nothing_leave_and_goes_on_with_all_that_came(group: GroupRelay):
-    outlets = [Outlet(), Outlet()]
-    connect(group, outlets)
-    group.flow.receive(0, Named(b"before"), BEGIN)
-    group.suspend()
-    group.flow.receive(1, Named(b"meanwhile"), BEGIN)
-    group.flow.receive(1, Named(b"no stamp"), None)
-    group.expire(BEGIN)
-    assert group.next_deadline() is None
-    assert [outlet.log for outlet in outlets] == [[], []]
-    connect(group, outlets)
-    group.resume()
-    assert [outlet.log for outlet in outlets] == [[b"before"], [b"meanwhile"]]
-    assert [(each.fed, each.matched, sum(each.dropped.values())) for each in group.counts()] == [(1, 1, 0), (2, 1, 1)]
-
-
 def test_a_group_that_lost_an_outlet_while_it_was_suspended_lets_no_set_leave_in_part(group: GroupRelay):
     outlets = [Outlet(), Outlet()]
     connect(group, outlets)

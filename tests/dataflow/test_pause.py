@@ -35,29 +35,6 @@ def _sent(outlets: list[Outlet]) -> list[list[int]]:
     return [[(stamp - BEGIN) // MS for stamp in outlet.log] for outlet in outlets]
 
 
-def test_what_waits_and_what_comes_is_dropped_as_paused_and_what_comes_after_is_matched():
-    group, outlets = _group()
-    _give(group, 0, 0)
-    group.pause()
-    group.pause()
-    for ms in (0, 10):
-        for index in range(2):
-            _give(group, index, ms)
-    assert _sent(outlets) == [[], []]
-    assert group.next_deadline() is None
-    group.unpause()
-    group.unpause()
-    # The partner of what was dropped finds nobody.
-    _give(group, 1, 0)
-    for index in range(2):
-        _give(group, index, 20)
-    assert _sent(outlets) == [[20], [20]]
-    camera, lidar = group.counts()
-    assert (camera.fed, camera.matched, dict(camera.dropped)) == (4, 1, {DropReason.PAUSED: 3})
-    assert (lidar.fed, lidar.matched) == (4, 1)
-    assert lidar.dropped[DropReason.PAUSED] == 2
-
-
 _STEPS = st.lists(
     st.one_of(
         st.tuples(st.integers(0, 2), st.integers(-25, 10)),

@@ -2,6 +2,7 @@
 
 import pytest
 
+from syncrelay.clock import Step
 from syncrelay.explain import (
     Code,
     Endpoint,
@@ -10,6 +11,7 @@ from syncrelay.explain import (
     Severity,
     Share,
     Standing,
+    Standstill,
     explanation,
     judge,
     with_ok,

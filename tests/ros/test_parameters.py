@@ -33,12 +33,10 @@ def test_a_key_of_the_file_is_named_once_and_a_parameter_of_another_node_never()
 @pytest.mark.parametrize(
     ("names", "said"),
     [
-        (["slop"], "`slop` belongs in the file, in a group"),
         (
             ["slop", "queue_size", "listen"],
             "`slop` and `queue_size` belong in the file, in a group; `listen` belongs in the file, in `metrics`",
         ),
-        (["groups.front.topics"], "`groups.front.topics` belongs in the file, in a group"),
         (["groups"], "`groups` belongs in the file"),
         (["config"], "`config` belongs behind `--config`"),
         (

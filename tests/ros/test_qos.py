@@ -31,22 +31,6 @@ def test_auto_takes_the_most_that_all_publishers_offer():
     assert matched(AUTO, []) == Profile(depth=100)
 
 
-@pytest.mark.parametrize(
-    ("asked", "reliability", "durability"),
-    [
-        (QosPreset("sensor_data"), "best_effort", "volatile"),
-        (QosOverrides(reliability="best_effort"), "best_effort", "transient_local"),
-        (QosOverrides(durability="volatile"), "reliable", "volatile"),
-        (QosPreset("best_available"), "reliable", "transient_local"),
-        (QosOverrides(reliability="best_available"), "reliable", "transient_local"),
-    ],
-    ids=["a preset", "only reliability", "only durability", "the best", "the best reliability"],
-)
-def test_what_the_file_says_overrides_what_the_publishers_offer(asked, reliability, durability):
-    profile = matched(asked, _KINDS[:1])
-    assert (profile.reliability, profile.durability) == (reliability, durability)
-
-
 _BEST = QosPreset("best_available")
 
 

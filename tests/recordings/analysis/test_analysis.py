@@ -149,19 +149,6 @@ def test_of_a_long_recording_values_are_tried_on_its_begin_and_that_is_said():
     assert {point.value: point.sets for point in curves.by_queue_size}[5] == len(evaluate(found.group, first).sets)
 
 
-def test_a_gps_beside_fast_odometry_has_no_needless_loss_to_show():
-    # 20 Hz beside 1 Hz: 19 of 20 have no partner to miss.
-    streams = streams_of(every(_SECOND, 60, phase=24 * MS), every(50 * MS, 1200, jitter=2 * MS), late=40 * MS)
-    found = _analyzed(streams, _pair_of(slop="30ms"))
-    gps, odometry = found.fates
-    assert len(found.evaluation.sets) == found.suggestion.possible == 60
-    assert found.evaluation.counts[1].dropped[DropReason.OVERFLOW] > 500
-    assert (odometry.matched, odometry.unneeded, odometry.dropped, odometry.lacking) == (60, 1140, {}, ("/a",))
-    assert (gps.matched, gps.unneeded, gps.dropped) == (60, 0, {})
-    assert {point.value: point.sets for point in found.curves.by_queue_size}[10] == found.suggestion.then
-    assert not [each for each in found.findings if each.finding.severity.name != "OK"]
-
-
 _FAULTS = {DropReason.MALFORMED, DropReason.UNSTAMPED, DropReason.DUPLICATE, DropReason.THINNED}
 
 
@@ -211,13 +198,6 @@ def test_what_was_not_needed_is_as_defined(topics, faults, slop, queue_size, opt
     assert found.unneeded.flags.tolist() == expected
     for row, counts in zip(found.fates, found.evaluation.counts, strict=True):
         assert row.received == row.matched + row.unneeded + sum(row.dropped.values()) == counts.fed
-
-
-def test_the_findings_are_those_of_the_running_relay():
-    streams = streams_of(every(100 * MS, 300), every(100 * MS, 300, phase=30 * MS))
-    first = watch_group(group_of(_pair_of(), "front"), streams)[0]
-    assert (first.finding.code.value, first.finding.severity.name) == ("over_slop", "ERROR")
-    assert 20 < first.seconds <= 30
 
 
 @pytest.mark.parametrize(("max_age", "cures"), [("150ms", True), ("60ms", False)])

@@ -65,11 +65,6 @@ def test_what_was_measured_stands_in_comments(tmp_path):
     assert lidar.endswith("Hz, best_effort")
 
 
-def test_a_constant_distance_is_told(tmp_path):
-    frames = merged(at("/lidar", *range(0, 5000, 100)), at("/camera", *range(12, 5000, 100)))
-    assert "if one trigger starts both, write `offset: " in _proposed(write_mcap(tmp_path / "rig.mcap", frames))[0]
-
-
 def _no_groups_topics() -> list[Frame]:
     """Topics that no group can take, each for another reason."""
     at_100_ms = [BEGIN + n * 100 * MS for n in range(50)]
@@ -144,11 +139,3 @@ def test_of_a_topic_of_two_types_the_one_with_more_messages_is_taken(tmp_path):
 
 def _point(stamp: int) -> bytes:
     return serialize(POINT, header(stamp), STORE.types["geometry_msgs/msg/Point"](0.0, 0.0, 0.0))
-
-
-def test_a_queue_is_as_long_as_a_fast_topic_needs_beside_a_late_one(tmp_path):
-    lidar = [each._replace(time=each.time + 50 * MS) for each in at("/lidar", *range(0, 9000, 100))]
-    text, sets = _proposed(write_mcap(tmp_path / "rig.mcap", merged(at("/imu", *range(0, 9000, 5)), lidar)))
-    (group,) = load_text(text).groups
-    assert group.options.queue_size > 10
-    assert sets["fused"] == 90
