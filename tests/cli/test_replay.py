@@ -36,12 +36,6 @@ def test_it_prints_the_summary_of_the_relay(folder):
     assert read_summary(done.stdout)["front"].sets == 39
 
 
-def test_several_files_are_replayed_as_one(folder):
-    (folder / "g.yaml").write_text(_file().replace("front", "rear"))
-    done = run_here("replay", "rig.mcap", "--config", "f.yaml", "--config", "g.yaml", folder=folder)
-    assert (done.returncode, done.stdout, done.stderr) == (0, _SUMMARY + _SUMMARY.replace("front", "rear"), "")
-
-
 def test_with_drops_there_is_a_line_a_drop_with_its_reason(folder):
     (folder / "f.yaml").write_text(_file(slop="1ms"))
     done = run_here("replay", "rig.mcap", "--config", "f.yaml", "--drops", folder=folder)

@@ -55,11 +55,6 @@ def test_files_that_are_mounted_by_links_are_read_once(folder, environ):
     assert [each.name for each in load("conf", environ=environ).groups] == ["front"]
 
 
-def test_a_file_alone_in_a_directory_needs_groups_as_any_other(folder, environ):
-    (folder / "node.yaml").write_text("version: 1\nnode: {name: relay}\n")
-    assert errors(environ, "conf") == ["conf/node.yaml:1:1: groups: missing, expected one group or more"]
-
-
 def test_a_directory_of_very_many_files_is_not_read(folder, environ):
     for number in range(MOST_FILES + 1):
         (folder / f"{number}.yaml").touch()

@@ -38,8 +38,3 @@ def test_what_nothing_tells_is_one_note_a_group():
         " checked here"
     )
     assert notes[1].text.startswith("the type of `/d` comes from the graph")
-
-
-def test_a_file_whose_every_type_is_written_has_no_such_note():
-    written = [{**A, "type": IMU}, {**B, "type": IMU}]
-    assert load_text(file(front=written), environ={}).notes == ()

@@ -139,17 +139,6 @@ def test_the_unit_of_a_fast_input_that_has_come_for_long_is_known():
     assert "another unit or rate" in known_soon(began, Code.OTHER_CLOCK)
 
 
-def test_a_graph_that_was_empty_explains_nothing_once_others_are_there():
-    a_judge = Judge()
-    alone = a_silent_group(
-        *(an_input(name, publishers=(), figures={"last_received": None}) for name in ("/camera", "/lidar")),
-        empty_graph=GraphSnapshot(7, "LOCALHOST"),
-    )
-    assert codes(a_judge.judge(alone)) == [Code.ALONE]
-    since = {"nearest_since": wide(*[30] * 60)["nearest"], "now": NOW + 3 * S}
-    assert codes(a_judge.judge(a_silent_group(figures=since))) == [Code.OVER_SLOP]
-
-
 def test_who_is_still_missing_when_others_come_is_told_at_once():
     missing = [an_input(name, publishers=(), figures={"last_received": None}) for name in ("/camera", "/lidar")]
     a_judge = Judge()

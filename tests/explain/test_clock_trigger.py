@@ -9,9 +9,8 @@ import pytest
 from syncrelay.config import load_text
 from syncrelay.explain import Code, Finding, GroupWatch, InputGraph, Severity, explanation, judge, with_ok
 from tests.explain.scenario import Source, Told, run
-from tests.explain.support.cases import LIDAR, camera
 from tests.explain.support.cases_stamps import AT_TICKS
-from tests.explain.support.groups import S, a_group, a_silent_group, an_input
+from tests.explain.support.groups import S, a_silent_group, an_input
 
 CAMERA = Source("/camera", hz=30)
 
@@ -110,9 +109,3 @@ def test_old_stamps_do_not_matter_where_any_age_will_do():
     inputs = [an_input(name, figures={"delay": None, "delays": (40 * S,) * 20}) for name in ("/camera", "/lidar")]
     found = judge(a_silent_group(*inputs, **{**AT_TICKS, "tolerance": None}))
     assert Code.OTHER_CLOCK not in [each.code for each in found]
-
-
-def test_every_input_is_held_so_one_that_repeats_its_stamp_is_no_fault():
-    repeating = camera(figures={"duplicates": 50})
-    found = judge(a_group(repeating, LIDAR, **{**AT_TICKS, "tolerance": None}))
-    assert Code.DUPLICATES not in [each.code for each in found]

@@ -50,13 +50,6 @@ def test_a_group_without_one_of_three_stands_well_and_says_who_is_missing_for_go
     assert severities(told, 130, 140) == set()
 
 
-def test_one_of_which_the_file_says_that_it_is_optional_is_no_news_after_a_minute():
-    sources = list(lidars({"/right": (20, 999)}))
-    sources[2] = Source("/right", 10, required=False, sends=lambda second: second < 20)
-    told = run(*sources, seconds=100, options=OPTIONS)
-    assert severities(told, 90, 100) == {Severity.OK}
-
-
 @pytest.mark.parametrize("alive", NAMES)
 def test_a_group_without_two_of_three_is_silent_because_of_both(alive):
     dead = {name: (20, 40) for name in NAMES if name != alive}

@@ -71,6 +71,13 @@ def test_the_queue_that_was_needed_is_told(policy, fed, needed):
     assert lengths == ([None] * policy.n_inputs if needed is None else [needed, *[None] * (policy.n_inputs - 1)])
 
 
+def test_what_was_lost_a_nanosecond_after_a_trigger_was_not_missed():
+    policy = latest(2, 2, 3)
+    for index, stamp in ((1, 11), (1, 20), (1, 30), (0, 10)):
+        policy.add(Message(index, stamp, None))
+    assert policy.needed_queue(1) is None
+
+
 @pytest.mark.parametrize(
     ("lost", "wanted", "reach", "needed"),
     [

@@ -89,6 +89,17 @@ def test_a_set_that_waited_too_long_is_dropped_and_says_what_it_lacked_and_how_l
     assert [*engine.lapses] == [late, Lapse(0, late.missing, needed_ns=180 * MS, covered=START + 181 * MS)]
 
 
+def test_after_a_flush_no_set_that_was_given_up_is_followed():
+    frames = known_at(START - 10 * MS, START)
+    engine = group(frames)
+    add(engine, START + MS)
+    engine.expire(now=START + 101 * MS)
+    engine.flush(DropReason.TIME_JUMP)
+    frames.add(moving(START + 5 * MS))
+    engine.expire(now=START + 181 * MS)
+    assert [each.needed_ns for each in engine.lapses] == [None]
+
+
 def test_a_message_without_a_frame_is_given_up_at_once():
     engine = group(known_at(START - MS, START + 50 * MS))
     assert [each.reason for each in add(engine, START, frames=("", None))] == [DropReason.NO_TRANSFORM] * 2
