@@ -261,7 +261,9 @@ class Trials:
 
     def _tolerances(self, possible: PossibleSets) -> Sequence[str]:
         if not self.is_window:
-            # A whole recording shows how far apart they come.
+            # A whole recording shows how far apart they come. Live, nothing is offered where other sets are as near, as
+            # one input may be stamped wrong. By that rule `init` would give no file for a camera and a lidar that are
+            # 30 ms apart beside an IMU.
             return (with_headroom(possible.spans), words.at_least(possible.widest))
         return tolerances(possible, [self.stamps(each) for each in possible.among], self.config.options.distance)
 

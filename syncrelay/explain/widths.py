@@ -29,6 +29,8 @@ _USUAL_RATE: Final = 100e-6
 _HOLDS: Final = 60 * _SECOND
 # Half a period and a little: no message is farther from the nearest of a steady input.
 _HALF: Final = 0.525
+# Inputs that come so many times in a period of the slowest are quick beside it.
+_OFTEN: Final = 10
 
 
 class Wander(NamedTuple):
@@ -80,13 +82,24 @@ def are_amid(stamps: Nanoseconds, others: Nanoseconds) -> bool:
     return len(distances) > 0 and quantile(distances, _TIGHT) > _CLEARLY * period_of(others) > 0
 
 
+def _others_as_near(spans: Nanoseconds, periods: Sequence[float]) -> bool:
+    """Whether other sets are about as near, and it matters which leave.
+
+    It does not where the quick inputs run free of the slow ones: their messages lie up to half a period away, and are
+    all of nearly the same moment.
+    """
+    quick, tight = min(periods), quantile(spans, _TIGHT)
+    run_free = tight <= _HALF * quick and _OFTEN * quick <= max(periods)
+    return tight > _CLEARLY * quick > 0 and not run_free
+
+
 def tolerances(possible: PossibleSets, stamps: Sequence[Nanoseconds], distance: Distance) -> tuple[str, ...]:
     """Return durations to try, of sets whose inputs have these stamps in order; none where others are about as near."""
     if distance is not Distance.SPAN or possible.is_alone:
         return tuple(dict.fromkeys((with_headroom(possible.spans), words.at_least(possible.widest))))
     pivot = stamps[possible.among.index(possible.pivot)]
     others = [each for each in stamps if each is not pivot]
-    if quantile(possible.spans, _TIGHT) > _CLEARLY * min(map(period_of, stamps)) > 0:
+    if _others_as_near(possible.spans, [period_of(each) for each in stamps]):
         return ()
     wanders = [wander(pivot, each) for each in others]
     room, more = _headroom(possible.spans), sum(each.in_a_minute for each in wanders)

@@ -25,13 +25,13 @@ def stamps(
     return BEGAN + (np.sort(times) * MS).astype(np.int64)
 
 
-def offered(one, other) -> tuple[str, ...]:
-    inputs = [Message(index, each, each) for index, of in enumerate((one, other)) for each in of.tolist()]
-    config = group_of([Source("/camera", hz=1), Source("/lidar", hz=1)], {"slop": "1ms"})
-    arrays = as_arrays(sorted(inputs, key=lambda each: each.payload), 2)
-    possible = possible_sets(config, arrays, (0, 1), is_window=False)
+def offered(*inputs) -> tuple[str, ...]:
+    messages = [Message(index, each, each) for index, of in enumerate(inputs) for each in of.tolist()]
+    config = group_of([Source(f"/input_{index}", hz=1) for index in range(len(inputs))], {"slop": "1ms"})
+    arrays = as_arrays(sorted(messages, key=lambda each: each.payload), len(inputs))
+    possible = possible_sets(config, arrays, range(len(inputs)), is_window=False)
     assert possible is not None
-    return tolerances(possible, (one, other), Distance.SPAN)
+    return tolerances(possible, inputs, Distance.SPAN)
 
 
 def test_clocks_that_run_off_each_other_are_told_from_those_of_one_trigger():
@@ -79,6 +79,27 @@ def test_the_fewer_spans_there_are_the_more_room_is_left():
     assert 11 * MS <= parse_duration(with_headroom(many)) <= 12 * MS
 
 
-@pytest.mark.parametrize(("phase_ms", "is_offered"), [(30, True), (38, True), (43, False), (50, False), (57, False)])
-def test_no_tolerance_is_offered_for_what_lies_amid_two(phase_ms, is_offered):
-    assert bool(offered(stamps(100, 20), stamps(100, 20, phase_ms=phase_ms))) is is_offered
+@pytest.mark.parametrize(
+    ("slow_ms", "phase_ms", "is_offered"),
+    [
+        (100, 30, True),
+        (100, 38, True),
+        (100, 43, False),
+        (100, 50, False),
+        (100, 57, False),
+        (900, 50, False),
+        # Either partner of a message that comes so seldom is of nearly its moment.
+        (1000, 38, True),
+        (1000, 43, True),
+        (1000, 50, True),
+    ],
+)
+def test_no_tolerance_is_offered_for_what_lies_amid_two_unless_both_are_of_nearly_its_moment(
+    slow_ms, phase_ms, is_offered
+):
+    assert bool(offered(stamps(slow_ms, 20), stamps(100, 20, phase_ms=phase_ms))) is is_offered
+
+
+def test_no_tolerance_is_offered_for_slow_inputs_that_are_apart_by_more_than_half_a_period_of_a_quick_one():
+    slow = [stamps(1000, 20), stamps(1000, 20, phase_ms=150)]
+    assert offered(*slow, stamps(100, 20)) == ()

@@ -220,6 +220,14 @@ def test_a_device_is_offered_to_be_mapped_where_that_brings_the_sets_of_a_clock_
     assert (mapped.findings == ()) is cures
 
 
+def test_a_recording_of_a_camera_and_a_lidar_that_are_apart_beside_an_imu_is_given_a_slop():
+    """Live none is offered: beside the period of the IMU, sets of other messages are as near."""
+    text = _pair_of(topics=inputs({"/a": VECTOR, "/b": VECTOR, "/c": VECTOR}))
+    found = _analyzed(streams_of(every(100 * MS, 200), every(100 * MS, 200, phase=30 * MS), every(10 * MS, 2000)), text)
+    assert (found.suggestion.now, found.suggestion.then) == (0, found.suggestion.possible)
+    assert found.suggestion.changes[0].key == "slop"
+
+
 def _watched(streams):
     found = watch_group(group_of(_pair_of(), "front"), streams)
     return {(each.finding.code.value, each.finding.input): each.seconds for each in found}
