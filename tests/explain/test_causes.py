@@ -17,7 +17,6 @@ from syncrelay.explain import (
     with_ok,
 )
 from syncrelay.explain.causes import EXPLAINS, explained_by
-from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.epochs import Reading
 from syncrelay.explain.known_soon import known_soon
 from syncrelay.sync.messages import DropReason
@@ -41,10 +40,6 @@ def test_no_finding_explains_itself_by_way_of_others():
 
     for code in EXPLAINS:
         walk(code, [])
-
-
-def test_sets_that_were_too_wide_a_while_ago_are_no_finding_while_those_of_now_are_not():
-    assert codes(judge(a_group(figures={**WIDE, "nearest_lately": Distribution([5 * MS] * 20)}))) == []
 
 
 @pytest.mark.parametrize(

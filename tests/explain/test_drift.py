@@ -29,11 +29,6 @@ def test_a_drift_is_measured_in_the_noise(ppm):
     assert found.watched_ns == 119 * S
 
 
-@pytest.mark.parametrize("n", [0, 1, 3])
-def test_few_points_tell_nothing(n):
-    assert drift(points(lambda second: second * MS, n=n)) is None
-
-
 @pytest.mark.parametrize(
     "delay",
     [

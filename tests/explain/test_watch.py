@@ -61,17 +61,6 @@ def test_the_keys_of_the_file_become_facts():
     ]
 
 
-def test_the_graph_becomes_facts():
-    camera, lidar = facts(policy="exact_time").inputs
-    assert (camera.output, camera.graph.publishers, camera.graph.alike, camera.graph.lost) == (
-        "/front/camera",
-        (Endpoint("/usb_cam", IMAGE),),
-        ("/cam",),
-        3,
-    )
-    assert (lidar.graph.not_importable, lidar.graph.refusal) == ("no such package", REFUSAL)
-
-
 def test_what_came_becomes_facts_with_the_newest_keys():
     group = watch(**KEYED)
     counts = (InputCounts(1, 0, {}, 1), InputCounts(0, 0, {}, 0))

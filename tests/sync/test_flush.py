@@ -31,6 +31,18 @@ def test_what_is_buffered_leaves_input_by_input_oldest_first(name):
 
 
 @every_policy
+def test_what_overflowed_before_it_is_not_missed_after_it(name):
+    policy = make_policy(name, Options(required=(True, True), queue_size=5, slop=0))
+    for tick in range(1, 21):
+        policy.add(message(1, tick))
+    policy.flush(DropReason.TIME_JUMP)
+    for tick in range(16, 21):
+        policy.add(message(1, tick))
+    policy.add(message(0, 15))
+    assert needed_queues(policy) == [0, 0]
+
+
+@every_policy
 @settings(max_examples=chosen(short=8, long=400))
 @given(data=st.data(), chosen=options(optional=False, limited=False, thinned=False))
 def test_the_policy_is_as_new_but_for_the_queues_that_were_needed(name, data, chosen):

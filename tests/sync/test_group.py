@@ -5,6 +5,7 @@ from typing import Any, assert_type
 import pytest
 
 from syncrelay.sync import (
+    ApproximateTime,
     Drop,
     DropReason,
     ExactTime,
@@ -32,6 +33,10 @@ def exact(**options):
     return grouped(ExactTime(n_inputs=2, queue_size=10), **options)
 
 
+def approximate(inputs=2, **options):
+    return grouped(ApproximateTime(n_inputs=inputs, queue_size=5, slop_ns=TICK_NS), **options)
+
+
 def test_counts_say_where_every_message_went():
     group = exact()
     for index, time in ((0, 1), (0, 2), (1, 2), (0, 3), (0, 1)):
@@ -44,6 +49,16 @@ def test_counts_say_where_every_message_went():
         InputCounts(fed=2, matched=1, dropped={DropReason.MALFORMED: 1}, buffered=0, needed_queue=None),
     )
     assert group.sets == 1
+
+
+@pytest.mark.parametrize("options", [{}, {"max_wait": 5}, {"inputs": 3, "optional": (0,), "max_wait": 5}])
+def test_counts_tell_the_queue_that_was_needed(options):
+    group = approximate(**options)
+    for column in range(20):
+        group.add(Message(1, stamp(column), None), now=0)
+    other = 2 if "inputs" in options else 0
+    group.add(Message(other, stamp(7), None), now=0)
+    assert [index for index, counts in enumerate(group.counts()) if counts.needed_queue == 14] == [1]
 
 
 def test_what_passed_before_a_flush_is_counted_again_after_it():

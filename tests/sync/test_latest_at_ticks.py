@@ -75,6 +75,37 @@ def test_an_hour_in_which_nothing_came_costs_no_work_and_gives_no_more_sets_than
     assert match.stamps == (at(hour), at(0))
 
 
+def test_no_tick_comes_twice_when_the_clock_is_corrected_and_all_come_again_when_it_starts_again():
+    group = by_clock()
+    for index in range(2):
+        group.add(message(index, 0), now=at(0))
+    assert [match.tick for match in group.expire(now=at(2000))] == [at(50 * n) for n in range(1, 41)]
+    assert group.expire(now=at(1000)) == []
+    assert group.next_deadline() == at(2050)
+    # A reset simulation, which also flushes.
+    group.flush(DropReason.TIME_JUMP)
+    for index in range(2):
+        group.add(message(index, 10), now=at(20))
+    assert [match.tick for match in group.expire(now=at(100))] == [at(50), at(100)]
+    group.pass_over(now=at(-1500))
+    assert group.next_deadline() == at(50)
+
+
+def test_the_queue_that_is_needed_has_room_for_every_tick_that_is_waited_for():
+    def overflowed(queue):
+        group = by_clock(queue=queue, max_wait=50)
+        left = []
+        for ms in range(0, 2000, 10):
+            for index in range(2):
+                left += group.add(message(index, ms), now=at(ms))
+        return group.counts()[0].needed_queue, len(sets_of(left))
+
+    assert overflowed(4) == (12, 0)
+    needed, sets = overflowed(12)
+    assert needed is None
+    assert sets == 30
+
+
 _RATES = (Ticks(100), Ticks(20), Ticks(30), Ticks(2997, 100), Ticks(300), Ticks(3, 2))
 
 
