@@ -105,12 +105,3 @@ def test_long_searches_give_what_single_steps_give():
         for number, (index, stamp) in enumerate(gappy(rng, sizes["n_inputs"], 300)):
             message = Message(index, stamp, number)
             assert told(policy.add(message)) == told(reference.add(message)), f"seed {seed}, event {number}"
-
-
-def test_a_better_set_does_not_begin_another_wait():
-    policy = ApproximateTime(n_inputs=3, queue_size=10, slop_ns=20 * MS)
-    for index, ms in ((0, 0), (1, 5), (2, 3)):
-        policy.add(Message(index, ms * MS, None))
-    assert (policy.waits_started, policy.waits_ended) == (1, 0)
-    assert len(policy.add(Message(0, 2 * MS, None))) == 1
-    assert (policy.waits_started, policy.waits_ended) == (1, 0)
