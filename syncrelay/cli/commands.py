@@ -14,8 +14,8 @@ from syncrelay.cli.parser import Parser
 from syncrelay.errors import UnavailableError
 
 EXTRAS: Final[Mapping[str, tuple[str, ...]]] = {
-    "recordings": ("jinja2", "lz4", "mcap", "rich", "rosbags", "ruamel.yaml", "zstandard"),
-    "datasets": ("PIL", "av", "pyarrow"),
+    "recordings": ("jinja2", "lz4", "mcap", "rich", "rosbags", "ruamel.yaml", "small_mcap", "zstandard"),
+    "datasets": ("PIL", "av", "isal", "pyarrow"),
     "fleet": ("ray",),
     "top": ("rich", "textual"),
 }
