@@ -43,12 +43,8 @@ def _noted(flow: Flow, match: Match, latency: int, is_by_header: Sequence[bool])
         )
     received = [None if message is None else message.payload.received for message in match.messages]
     sent, unpublished = _sent(flow, len(stamps))
-    return Note(flow.n_sets, latency, common, stamps, left_as, received, sent, unpublished, _bundle(flow, len(stamps)))
-
-
-def _bundle(flow: Flow, n_inputs: int) -> int:
-    """Return which message of its topic the bundle of the last set was, 0 if it was not published."""
-    return 0 if flow.bundle is None or n_inputs in flow.unpublished else flow.bundle.sent
+    bundle = 0 if flow.bundle is None or len(stamps) in flow.unpublished else flow.bundle.sent
+    return Note(flow.n_sets, latency, common, stamps, left_as, received, sent, unpublished, bundle)
 
 
 def _sent(flow: Flow, n_inputs: int) -> tuple[Sequence[int], Mapping[int, str]]:

@@ -36,8 +36,8 @@ _LOG = logging.getLogger("syncrelay")
 _LEVELS: Final = {Severity.OK: logging.INFO, Severity.WARN: logging.WARNING, Severity.ERROR: logging.ERROR}
 
 EVALUATE_S: Final = 1.0
-# At least this many groups are evaluated at a time: each takes some tenths of a millisecond from the data ...
-_IN_TURN: Final = 10
+# At least this many groups are evaluated at a time: each takes up to a millisecond from the data ...
+_IN_TURN: Final = 5
 # ... and each is evaluated at least every fourth time: a group counts as silent after 5 s.
 _LONGEST_TURN: Final = 4
 

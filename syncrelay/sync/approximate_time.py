@@ -188,30 +188,33 @@ class ApproximateTime(Queued):
     def _search(self, outcomes: list[Outcome]) -> list[Outcome]:
         overflowed = self._overflowed
         numerator, denominator = self._scale
-        steps = 0
+        steps, is_narrowed = 0, self._are_narrowed
         while len(self._heads) == self.n_inputs:
             steps += 1
-            if steps > _STEPS and not self._are_narrowed:
+            if steps > _STEPS and not is_narrowed:
                 self._stride(outcomes)
             heads = self._heads
-            apart = self._apart() if self._are_narrowed else None
-            start, _ = heads[0]
-            _, first = heads[apart or 0]
+            start, first = heads[0]
             end, latest = heads[-1]
+            apart = None
+            if is_narrowed and (apart := self._apart()) is not None:
+                _, first = heads[apart]
             if overflowed:
                 self._excuse_all_but(latest)
             if self._pivot is None:
                 if end - start > self._slop or overflowed or apart is not None:
                     self._drop_heads(outcomes, apart)
                     continue
-                self._take_first_candidate(start, end, latest)
-            elif apart is None:
-                later_end = end - self._candidate_end
-                later_start = start - self._candidate_start
-                # The penalty only lengthens, so the first comparison avoids most of the products.
-                if later_end < later_start and later_end * numerator < later_start * denominator:
-                    self._drop_skipped(outcomes)
-                    self._take_candidate(start, end)
+                self._pivot, self._pivot_stamp = latest, end
+                self._take_candidate(start, end)
+            elif (
+                apart is None
+                # The penalty only lengthens, so this comparison avoids most of the products.
+                and (later_end := end - self._candidate_end) < (later_start := start - self._candidate_start)
+                and later_end * numerator < later_start * denominator
+            ):
+                self._drop_skipped(outcomes)
+                self._take_candidate(start, end)
             stamps = self._stamps[first]
             cursor = self._cursors[first] = self._cursors[first] + 1
             del heads[apart or 0]
@@ -302,14 +305,10 @@ class ApproximateTime(Queued):
         if stamps:
             insort(self._heads, (stamps[0], place))
 
-    def _take_first_candidate(self, start: int, end: int, latest: int) -> None:
-        self._pivot = latest
-        self._pivot_stamp = end
+    def _take_candidate(self, start: int, end: int) -> None:
+        # The wait for a better one goes on with the next.
         if self.waits_started == self.waits_ended:
             self.waits_started += 1
-        self._take_candidate(start, end)
-
-    def _take_candidate(self, start: int, end: int) -> None:
         numerator, denominator = self._scale
         self._candidate_start = start
         self._candidate_end = end
