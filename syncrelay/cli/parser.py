@@ -17,8 +17,9 @@ _WIDTH: Final = 78
 # 31 years: timers take it, and so do stamps.
 _MOST_S: Final = 1_000_000_000
 IMAGE_FORMATS: Final = ("png", "jpeg")
-COMPRESSIONS: Final = ("zstd", "lz4", "none")
 """What `export --images` can make of an image."""
+COMPRESSIONS: Final = ("zstd", "lz4", "none")
+"""How `export` and `replay` can pack what they write."""
 
 # The metavars of arguments that name YAML files to read.
 _YAML_FILES: Final = ("FILE", "OLD", "NEW")

@@ -73,7 +73,7 @@ class SlopGroup(Group):
         return self.tolerance if own is None else Tolerance("tolerance", own)
 
     def tolerances_ns(self) -> tuple[int | None, ...]:
-        """Return the topics' own."""
+        """Return the `tolerance` of each topic, in nanoseconds; None where it has none."""
         return tuple(topic.tolerance if isinstance(topic, NearTopic) else None for topic in self.topics)
 
 

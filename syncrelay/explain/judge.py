@@ -17,6 +17,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
 
+from syncrelay.config.wording import counted
 from syncrelay.explain import (
     rules_clock,
     rules_drift,
@@ -336,7 +337,7 @@ def with_ok(facts: GroupFacts, found: tuple[Finding, ...]) -> tuple[Finding, ...
         severity = Severity.OK
     elif facts.is_look and share.value is None and not share.is_certain:
         few = facts.pacemaker.name if share.pacemaker is None else facts.inputs[share.pacemaker].name
-        sets = "1 set" if figures.sets == 1 else f"{figures.sets} sets"
+        sets = counted(figures.sets, "set")
         text, severity = f"{sets} so far, but too few messages of {few} to tell how many were possible", Severity.OK
     else:
         code, severity = Code.HEALTHY, Severity.OK

@@ -175,10 +175,7 @@ class OptionalInputs(OptionalStage):
             heads = {index: stamps[index][place] for index, place in places.items() if place < len(stamps[index])}
             if len(heads) < self.lacking:
                 return
-            reaches = {index: self._windows[index] for index in heads}
-            windows = {
-                index: (head - reaches[index].before, head + reaches[index].after) for index, head in heads.items()
-            }
+            windows = {index: self._windows[index].around(head) for index, head in heads.items()}
             begin = sorted(first for first, _ in windows.values())[self.lacking - 1]
             close = min(last for _, last in windows.values())
             if close < begin:

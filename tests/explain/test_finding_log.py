@@ -112,7 +112,7 @@ def summary(caplog):
         caplog.clear()
         with caplog.at_level("INFO", "syncrelay"):
             log_summary([GroupReport(at(100, last_set=99), (), log=log)])
-        return [line.partition(":   ")[2] for line in caplog.messages if "the start" in line or "spell" in line]
+        return [line.partition(":   ")[2] for line in caplog.messages if "the start" in line or "earlier" in line]
 
     return said
 
@@ -131,7 +131,7 @@ def test_of_what_was_wrong_often_the_last_five_are_said(summary):
         told(log, range(begin, begin + 30), last_set=lambda _, begin=begin: begin)
         looked(log, at(begin + 32, last_set=begin + 31))
     first, *others = summary(log)
-    assert first == "2 spells of trouble before those that follow"
+    assert first == "2 earlier findings in the log above"
     assert [each.partition(" after")[0] for each in others] == ["3 min", "5 min", "7 min", "8 min", "10 min"]
 
 

@@ -59,17 +59,21 @@ def suggest(
 ) -> Suggestion:
     """Return better values for a group; `changed` gives the group with changes made, `trials` are those without."""
     found = _matching(group, streams, trials, evaluation, changed)
-    waits = tuple(_waits(evaluate(changed(found.changes), streams) if found.changes else evaluation, group))
-    if waits and len(evaluate(changed([*found.changes, *waits]), streams).sets) > len(evaluation.sets):
-        return replace(found, changes=(*found.changes, *waits))
-    return found
+    transforms = group.options.transforms
+    if transforms is None:
+        return found
 
+    def evaluated(changes: Sequence[Change]) -> Evaluation:
+        with_them = changed(changes)
+        return evaluate(with_them, stamped(with_them, streams))
 
-def _waits(evaluation: Evaluation, group: GroupConfig) -> Iterator[Change]:
-    """Wait for transforms as long as they lag."""
-    transforms, wait = group.options.transforms, enough_wait(evaluation.lapses)
-    if transforms is not None and wait is not None and parse_duration(wait) > transforms.wait:
-        yield Change(group.name, None, "transforms.wait", wait, "transforms lag behind the messages by nearly that")
+    now = evaluated(found.changes) if found.changes else evaluation
+    wait = enough_wait(now.lapses)
+    if wait is None or parse_duration(wait) <= transforms.wait:
+        return found
+    longer = Change(group.name, None, "transforms.wait", wait, "transforms lag behind the messages by nearly that")
+    changes = (*found.changes, longer)
+    return replace(found, changes=changes) if len(evaluated(changes).sets) > len(now.sets) else found
 
 
 def _matching(

@@ -27,6 +27,8 @@ _SUB: Final = 1
 # Higher levels take a tenth more time to save less than one per cent.
 _PNG_LEVEL: Final = 1
 _JPEG_QUALITY: Final = 95
+# Of several recordings, each core has one: more threads for each would only wait.
+_MOST_THREADS: Final = 4
 # libjpeg's JPEG_MAX_DIMENSION. Pillow gives its error as one of the file that is written.
 _LONGEST_JPEG: Final = 65_500
 
@@ -105,7 +107,7 @@ class ImageColumn:
     def encode(self, decoded: pa.ChunkedArray, arrow: pa.StructType) -> pa.ChunkedArray:
         """Return the encoded column; `arrow` is its type."""
         # The encoders let other threads run.
-        with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        with ThreadPoolExecutor(min(_MOST_THREADS, len(os.sched_getaffinity(0)))) as pool:
             rows = list(pool.map(lambda row: self._row(row, arrow), decoded))
         self.undecodable += rows.count(None) - decoded.null_count
         return pa.chunked_array([pa.array(rows, type=arrow)])
