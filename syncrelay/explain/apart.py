@@ -7,7 +7,8 @@ import numpy as np
 
 from syncrelay.explain import words
 from syncrelay.explain.facts import GroupFacts, InputFacts
-from syncrelay.explain.nearest import quantile, shifted, signed_distances
+from syncrelay.explain.nearest import Nanoseconds, quantile, shifted, signed_distances
+from syncrelay.explain.standing import FEW
 
 # Of fewer messages nothing is usual.
 _FEWEST: Final = 3
@@ -33,7 +34,7 @@ def who_is_off(facts: GroupFacts) -> str | None:
 
 
 def over_tolerances(facts: GroupFacts, index: int | None = None) -> str | None:
-    """Say which two inputs, of `index` and one that is required, slop allows and a tolerance of one of them does not.
+    """Say which two inputs, of `index` and one that is required, slop often allows and a tolerance does not.
 
     Without `index`, both are required. None if there are no such two.
     """
@@ -42,9 +43,10 @@ def over_tolerances(facts: GroupFacts, index: int | None = None) -> str | None:
     for pair in pairs:
         if facts.tolerance is None or all(each.narrowed is None for each in pair):
             continue
-        slop, apart = facts.tolerance.ns, _usually_apart(*pair)
+        slop, distances = facts.tolerance.ns, np.abs(_distances(*pair))
         room = sum(slop // 2 if each.narrowed is None else min(each.narrowed.ns, slop // 2) for each in pair)
-        if apart is not None and room < apart <= slop:
+        over = distances[(distances > room) & (distances <= slop)]
+        if len(distances) >= _FEWEST and len(over) > (1 - FEW) * len(distances):
             halves = (
                 f"half of {facts.tolerance.key} {words.duration(slop)}"
                 if each.narrowed is None
@@ -52,12 +54,20 @@ def over_tolerances(facts: GroupFacts, index: int | None = None) -> str | None:
                 for each in pair
             )
             names = " and ".join(each.name for each in pair)
-            return f"stamps of {names} are usually {words.duration(apart)} apart, over {' plus '.join(halves)}"
+            usual, limit = quantile(np.sort(distances), 0.5), f"over {' plus '.join(halves)}"
+            if usual > room:
+                return f"stamps of {names} are usually {words.duration(usual)} apart, {limit}"
+            share, most = words.share(len(over) / len(distances)), words.duration(int(over.max()))
+            return f"in {share} of messages, stamps of {names} are up to {most} apart, {limit}"
     return None
 
 
 def _usually_apart(*two: InputFacts) -> int | None:
     """Return how far apart the stamps of two inputs usually are, in nanoseconds; None if too few have come to tell."""
-    stamps = (np.sort(shifted(np.array(each.figures.stamps, dtype=np.int64), each.offset)) for each in two)
-    distances = signed_distances(*sorted(stamps, key=len))
+    distances = _distances(*two)
     return None if len(distances) < _FEWEST else abs(quantile(distances, 0.5))
+
+
+def _distances(*two: InputFacts) -> Nanoseconds:
+    stamps = (np.sort(shifted(np.array(each.figures.stamps, dtype=np.int64), each.offset)) for each in two)
+    return signed_distances(*sorted(stamps, key=len))

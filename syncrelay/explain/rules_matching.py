@@ -62,7 +62,8 @@ def over_slop(facts: GroupFacts) -> Found:
         return
     if next(other_clock(facts), None):
         return
-    if facts.has_stopped and (narrow := over_tolerances(facts)) is not None:
+    gives_few = facts.has_stopped or facts.standing is Standing.FEW
+    if gives_few and (narrow := over_tolerances(facts)) is not None:
         yield Fault(narrow, _CHECK_TOLERANCES, Severity.ERROR if facts.is_silent else Severity.WARN)
         return
     if facts.has_stopped and nearest.share_over(tolerance.ns) > 1 - _MISSED:

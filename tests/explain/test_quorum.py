@@ -86,6 +86,20 @@ def test_one_that_its_tolerance_keeps_out_is_told_so_and_no_slop_is_offered():
     assert finding.suggestion == "check how these topics are stamped, or write a wider `tolerance`"
 
 
+def test_where_a_tolerance_costs_half_of_the_sets_it_is_named():
+    told = run(
+        Source("/top", 20, topic_options={"tolerance": "2ms"}),
+        Source("/left", 20, jitter_ms=4, topic_options={"tolerance": "1ms"}),
+        seconds=40,
+        options={"slop": "20ms"},
+    )
+    found = {each.code.value: each.text for each in told.found[-1][1] if each.severity is not Severity.OK}
+    assert re.search(
+        r"in (3|4|5)\d % of messages, stamps of /top and /left are up to [\d.]+ ms apart, over tolerance 2 ms of /top",
+        found["over_slop"],
+    )
+
+
 @pytest.mark.parametrize("options", [OPTIONS, {"slop": "20ms"}], ids=["two of three", "all required"])
 def test_where_tolerances_let_no_set_leave_they_are_named_and_no_slop_is_offered(options):
     told = run(*lidars_of((0, 8, 16), ("2ms", "3ms", "2ms")), seconds=40, options=options)
