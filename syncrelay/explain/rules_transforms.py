@@ -21,7 +21,7 @@ def no_transform(facts: GroupFacts) -> Found:
     dropped = max(each.figures.dropped.get(DropReason.NO_TRANSFORM, 0) for each in facts.inputs)
     if not dropped or not facts.lapses or facts.transforms is None:
         return
-    lapses = [each for each in facts.lapses if each.needed_ns is None][-dropped:]
+    lapses = [each for each in _still_lacking(facts.lapses) if each.needed_ns is None][-dropped:]
     if not facts.has_stopped:
         # The first messages may be older than the first transforms: that is over once sets leave.
         lapses = [each for each in lapses if each.missing.lack is not Lack.PAST]
@@ -39,6 +39,18 @@ def no_transform(facts: GroupFacts) -> Found:
         Severity.ERROR if facts.is_silent else Severity.WARN,
         input=last.input,
     )
+
+
+def _still_lacking(lapses: Sequence[Lapse]) -> list[Lapse]:
+    """Leave out what an input lacked before its chain was there: once it is, only its stamps can be early or late."""
+    there, still = set(), []
+    for each in reversed(lapses):
+        if each.needed_ns is not None or each.missing.lack in (Lack.LATE, Lack.PAST):
+            there.add(each.input)
+            still.append(each)
+        elif each.input not in there:
+            still.append(each)
+    return still[::-1]
 
 
 def _told(missing: Missing, an_input: InputFacts, covered: Sequence[Lapse], facts: GroupFacts) -> tuple[str, str]:

@@ -116,7 +116,7 @@ class TransformStage:
         self._passed: list[int | None] = [None] * n_inputs
         self._followed: deque[_Needs] = deque(maxlen=_FOLLOWED)
         self.lapses: deque[Lapse] = deque(maxlen=2 * _FOLLOWED)
-        """The sets that were given up last, oldest first; and once more when it is known what wait they needed."""
+        """The sets that were given up last, oldest first; and once more when they lack something else, or nothing."""
 
     def take(self, outcomes: Sequence[Outcome], now: int) -> list[Outcome]:
         """Take what a policy lets leave; return what leaves now. Drops do not wait."""
@@ -231,10 +231,12 @@ class TransformStage:
             first = self._followed[0]
             if first.version == self._transforms.chains.version:
                 return
-            lapse = first.lapse
-            if self._look(first) is None and lapse is not None:
+            lapse, lacks = first.lapse, self._look(first)
+            if lacks is None and lapse is not None:
                 self.lapses.append(replace(lapse, needed_ns=now - first.since, covered=now))
             elif now - first.since < _FOLLOWED_NS:
+                if lacks is not None and lapse is not None and lacks.missing.lack is not lapse.missing.lack:
+                    self.lapses.append(lacks)
                 return
             self._followed.popleft()
 

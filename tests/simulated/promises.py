@@ -470,7 +470,9 @@ class Promises:
             if seen.at > plan.length:
                 return
             if seen.at < SETTLED_S:
-                if seen.code not in _QUIET | _AT_FIRST:
+                # Who sends transforms may be found later than the sensors, and sets do not wait for that.
+                late = {"no_transform"} if plan.transforms and plan.missed else set[str]()
+                if seen.code not in _QUIET | _AT_FIRST | late:
                     yield f"{seen.at:.2f} s: {group.name}: {seen.code}: {seen.text}\n    is said at once"
                     return
                 continue

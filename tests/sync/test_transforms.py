@@ -89,6 +89,16 @@ def test_a_set_that_waited_too_long_is_dropped_and_says_what_it_lacked_and_how_l
     assert [*engine.lapses] == [late, Lapse(0, late.missing, needed_ns=180 * MS, covered=START + 181 * MS)]
 
 
+def test_of_a_set_that_lacks_something_else_later_that_is_said_too():
+    frames = Frames()
+    engine = group(frames)
+    add(engine, START)
+    engine.expire(now=START + 100 * MS)
+    frames.add(moving(START + 5 * MS))
+    engine.expire(now=START + 181 * MS)
+    assert [each.missing.lack for each in engine.lapses] == [Lack.UNKNOWN_FRAME, Lack.PAST]
+
+
 def test_after_a_flush_no_set_that_was_given_up_is_followed():
     frames = known_at(START - 10 * MS, START)
     engine = group(frames)

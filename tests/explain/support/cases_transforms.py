@@ -48,6 +48,9 @@ QUIETLY = {
             camera(), LIDAR, transforms=TRANSFORMS, lapses=[Lapse(0, Missing(Lack.LATE, "odom", "base_link", MS))]
         ),
         "the first messages, older than the first transforms": given_up(Lack.PAST, by=300 * MS, count=2),
+        "a frame that a transform names by now": given_up(
+            Lack.UNKNOWN_FRAME, parent="base_link", child="camera_lens", needed=[2 * S, S], count=2
+        ),
         "messages that were dropped for another reason": a_group(
             dropped(DropReason.LATE, 30), LIDAR, transforms=TRANSFORMS
         ),

@@ -235,8 +235,9 @@ class Stage:
         if self.last is not None and stamp <= self.last[0]:
             return [Drop(message, DropReason.LATE)]
         same = [each for each in self.of(message.input) if self.is_same(each, (stamp, message))]
-        self.queued = [each for each in self.queued if each not in same] + [(stamp, message)]
+        # One that has left is not there while another of its key or stamp comes.
         self.came = {which: came for which, came in self.came.items() if which in map(self.which, self.queued)}
+        self.queued = [each for each in self.queued if each not in same] + [(stamp, message)]
         self.came.setdefault(self.which((stamp, message)), now)
         self.shown[message.input] = max(stamp, self.shown.get(message.input, stamp))
         left = [Drop(each, DropReason.DUPLICATE) for _, each in same] + self.leave_decided() + self.drop_alone()
