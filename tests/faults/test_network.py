@@ -5,6 +5,7 @@ import re
 import subprocess
 import time
 from collections.abc import Iterator
+from operator import eq, sub
 from typing import Any
 
 import pytest
@@ -54,10 +55,11 @@ class _Scene:
         words = [*self.cable.enter(self.cable.second), "python3", "-c", _GET, f"{address(self.relay)}{page}"]
         return subprocess.run(words, check=True, capture_output=True, text=True).stdout
 
-    def count(self, what: str) -> float:
-        """How many messages of all inputs were `sent`, `delivered` or `received`, by the metrics."""
-        found = re.findall(rf"^syncrelay_messages_{what}_total{{.*}} (.*)$", self._get("/metrics"), re.MULTILINE)
-        return sum(map(float, found))
+    def counts(self, *of: str) -> list[float]:
+        """How many messages of all inputs were `sent`, `delivered` or `received`, by the metrics at one moment."""
+        page = self._get("/metrics")
+        found = [re.findall(rf"^syncrelay_messages_{what}_total{{.*}} (.*)$", page, re.MULTILINE) for what in of]
+        return [sum(map(float, each)) for each in found]
 
     def state(self) -> dict[str, Any]:
         """The group as /status has it."""
@@ -89,11 +91,11 @@ def test_a_network_that_loses_throttles_and_breaks(stage: Stage, cable: Cable, w
     reliability = go_way(stage, way)
     scene = _Scene(stage, cable, reliability)
     cable.lose(0.1)
-    before = scene.count("sent"), scene.count("delivered")
+    before = scene.counts("sent", "delivered")
     lossy_hz = scene.run(_FAULT_S)
     if way in _TOLD:
         wait_until(lambda: _TOLD[way] in scene.codes(), "the loss to be told")
-    sent, delivered = scene.count("sent") - before[0], scene.count("delivered") - before[1]
+    sent, delivered = map(sub, scene.counts("sent", "delivered"), before)
     cable.lose_no_more()
     after_loss_s = scene.recover()
     # Of 100 messages a second of two topics, each of some 150 bytes on the wire, less than half comes through.
@@ -110,8 +112,8 @@ def test_a_network_that_loses_throttles_and_breaks(stage: Stage, cable: Cable, w
     # A busy machine loses more than the network does.
     assert way != "best_effort" or (sent - delivered) / sent > 0.03
     published = sum(scene.source.pace(0))
-    wait_until(lambda: scene.count("delivered") == scene.count("received"), "counts that agree")
-    assert scene.count("sent") <= published
+    wait_until(lambda: eq(*scene.counts("delivered", "received")), "counts that agree")
+    assert scene.counts("sent") <= [published]
     figures(
         f"network ({way}): 10 % lost: {lossy_hz:.0f} of {_HZ} sets a second; throttled to 100 kbit/s:"
         f" {throttled_hz:.0f}; cut for {_CUT_S} s: {cut_hz:.0f}, told as {', '.join(sorted(told))}; new sets"
