@@ -28,7 +28,9 @@ class ApproximateTimeEager(Queued):
 
     __slots__ = (
         "_are_narrowed",
+        "_in_window",
         "_losses",
+        "_messages",
         "_queue_size",
         "_queues",
         "_slop",
@@ -46,7 +48,10 @@ class ApproximateTimeEager(Queued):
         self._tolerances = tolerances_ns
         self._windows = windows_of(self._slop, tolerances_ns, n_inputs)
         self._are_narrowed = are_narrowed(self._windows, self._slop)
+        # The lists themselves: a queue's attributes and a zip of these cost more than the search, most of the time.
         self._stamps = [queue.stamps for queue in self._queues]
+        self._messages = [queue.messages for queue in self._queues]
+        self._in_window = list(zip(self._stamps, self._windows, strict=True))
 
     def for_required(self, required: Sequence[bool], quorum: int) -> tuple["ApproximateTimeEager", OptionalInputs]:
         size, slop, tolerances = self._queue_size, self._slop, self._tolerances
@@ -62,14 +67,14 @@ class ApproximateTimeEager(Queued):
         return policy, stage
 
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
-        queue, stamps = self._queues[place], self._stamps[place]
+        stamps = self._stamps[place]
         outcomes: list[Outcome] = []
         if not stamps or stamp > stamps[-1]:
             stamps.append(stamp)
-            queue.messages.append(message)
+            self._messages[place].append(message)
             if len(stamps) == 1:
                 self._begin(place, stamp, outcomes)
-        elif (replaced := queue.insert(stamp, message)) is not None:
+        elif (replaced := self._queues[place].insert(stamp, message)) is not None:
             outcomes.append(Drop(replaced, DropReason.DUPLICATE))
         elif stamps[0] == stamp:
             self._drop_too_far(outcomes)
@@ -79,22 +84,29 @@ class ApproximateTimeEager(Queued):
             self._match(stamp, outcomes)
         if len(stamps) > self._queue_size:
             self._losses.lose(place, stamps[0])
-            outcomes += queue.drop(1, DropReason.OVERFLOW)
+            outcomes += self._queues[place].drop(1, DropReason.OVERFLOW)
             self._drop_too_far(outcomes)
         return outcomes
 
     def _begin(self, place: int, stamp: int, outcomes: list[Outcome]) -> None:
         """Note which overflowed messages the only message of its input has missed, and drop what is too far."""
         before, after = self._windows[place]
-        for other, (stamps, window) in enumerate(zip(self._stamps, self._windows, strict=True)):
-            if stamps and stamps[0] > stamp + after + window.before:
+        begin, end = stamp - before, stamp + after
+        # The windows of the other first messages share a moment, so those of all do if each shares one with this.
+        for stamps, (earlier, later) in self._in_window:
+            if stamps and not begin - later <= stamps[0] <= end + earlier:
+                break
+        else:
+            return
+        for other, (stamps, window) in enumerate(self._in_window):
+            if stamps and stamps[0] > end + window.before:
                 self._losses.miss(other, stamps, stamp, before=before + window.after, after=after + window.before)
         self._drop_too_far(outcomes)
 
     def _drop_too_far(self, outcomes: list[Outcome]) -> None:
         """Drop messages that go with no message that another input has or will send."""
         while True:
-            firsts = [(stamps[0], window) for stamps, window in zip(self._stamps, self._windows, strict=True) if stamps]
+            firsts = [(stamps[0], window) for stamps, window in self._in_window if stamps]
             close = min([first + window.after for first, window in firsts], default=0)
             begin = max([first - window.before for first, window in firsts], default=0)
             if close >= begin:
@@ -105,7 +117,7 @@ class ApproximateTimeEager(Queued):
     def _match(self, stamp: int, outcomes: list[Outcome]) -> None:
         if max(map(len, self._stamps)) == 1:
             # The usual case: there is no choice, and nothing is left over.
-            outcomes.append(Match(tuple([queue.messages.pop() for queue in self._queues])))
+            outcomes.append(Match(tuple([messages.pop() for messages in self._messages])))
             for stamps in self._stamps:
                 stamps.clear()
             return
