@@ -35,6 +35,7 @@ class Surroundings:
         self._around: dict[InputBinding, _Around] = {}
         self._rivals_since: dict[InputBinding, int] = {}
         self._relayed: dict[str, bool] = {}
+        self._published: dict[str, tuple[tuple[str, ...], Sequence[EndpointInfo]]] | None = None
 
     def watch(self, bindings: Iterable[InputBinding]) -> None:
         """Forget all but these."""
@@ -46,6 +47,7 @@ class Surroundings:
         """Poll the graph again for each, as it has changed."""
         self._around.clear()
         self._relayed.clear()
+        self._published = None
 
     def empty_graph(self) -> GraphSnapshot | None:
         """Return the graph if no other node is in it. It is asked only while a topic has no publisher."""
@@ -105,12 +107,20 @@ class Surroundings:
 
     def _alike(self, name: str, type_name: str | None) -> tuple[str, ...]:
         """Return topics that may have been meant; outputs of relays are none."""
-        outputs = {self._node.resolve_topic(binding.output.topic) for binding in self._bindings}
-        published = graph.published_topics(self._graph)
-        types = {topic: tuple({each.type for each in publishers}) for topic, publishers in published.items()}
-        of_type = [topic for topic, of in types.items() if type_name in (None, *of) and topic not in outputs]
-        not_relayed = [topic for topic in of_type if not self._is_relayed(topic, published[topic])]
-        return graph.topics_alike(name, type_name, [(topic, types[topic]) for topic in not_relayed])
+        published = self._published
+        if published is None:
+            outputs = {self._node.resolve_topic(binding.output.topic) for binding in self._bindings}
+            published = self._published = {
+                topic: (tuple({each.type for each in publishers}), publishers)
+                for topic, publishers in graph.published_topics(self._graph).items()
+                if topic not in outputs
+            }
+        not_relayed = [
+            (topic, types)
+            for topic, (types, publishers) in published.items()
+            if type_name in (None, *types) and not self._is_relayed(topic, publishers)
+        ]
+        return graph.topics_alike(name, type_name, not_relayed)
 
     def _is_relayed(self, name: str, publishers: Sequence[EndpointInfo]) -> bool:
         if name not in self._relayed:
