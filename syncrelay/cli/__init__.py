@@ -25,6 +25,8 @@ def _run(words: Sequence[str], stop: StopRequest) -> int:
     release_signals()
     # No model of ours uses plugins, and to search for them pydantic looks at every installed package.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    # Nothing here multiplies matrices, for which numpy would start a thread on every core.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Imported after the signal handlers are installed.
     from syncrelay.cli.boundary import guarded
     from syncrelay.cli.dispatch import dispatch
