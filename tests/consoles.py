@@ -165,7 +165,7 @@ class Reader:
         elif _stays(words):
             self._start(argv, command)
         else:
-            if words[0] in _NEEDS_NO_PROCESS and not self.inside and "--into" not in words:
+            if words[0] in _NEEDS_NO_PROCESS and not self.inside:
                 done = run_here(*words, folder=self.folder, environ=self._environment)
             else:
                 done = preloaded.run(argv, environ=self._environment, folder=self.folder)

@@ -11,7 +11,7 @@ from typing import Final
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from docs.generate.commands import exit_codes, of_many_recordings, relay, the_commands
+from docs.generate.commands import exit_codes, relay, the_commands
 from docs.generate.facts import facts
 from docs.generate.findings import findings, matching
 from docs.generate.keys import of_file, of_group, of_model, of_topic, policies
@@ -40,7 +40,6 @@ def pages() -> Mapping[str, str]:
             "relay": relay(),
             "commands": the_commands(),
             "exit_codes": exit_codes(),
-            "of_many_recordings": of_many_recordings(),
         },
         "status.md": {"objects": objects()},
         "facts.md": {"facts": facts()},

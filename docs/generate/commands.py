@@ -1,10 +1,8 @@
 """The commands and their options as their page shows them."""
 
 import argparse
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 
 from docs.generate.markdown import plain
 from syncrelay.cli import run
@@ -13,8 +11,6 @@ from syncrelay.cli.commands import COMMANDS, Need
 from syncrelay.cli.parser import Parser
 
 _WIDTH = 100
-# Options that so many commands have alike are listed once.
-_SEVERAL = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,14 +27,6 @@ class _Command:
     options: Sequence[_Option]
     needs: Sequence[Need] = ()
 
-    def own_options(self) -> Iterator[_Option]:
-        """Yield the options that only few commands have."""
-        return (each for each in self.options if each not in of_many_recordings())
-
-    def takes_many_recordings(self) -> bool:
-        """Say whether it has the others."""
-        return any(each in of_many_recordings() for each in self.options)
-
 
 def relay() -> _Command:
     """Return the relay, which is no command."""
@@ -49,13 +37,6 @@ def the_commands() -> Iterator[_Command]:
     """Yield all commands, in the order of the help."""
     for command in COMMANDS.values():
         yield _command(command.parser(), command.needs)
-
-
-@cache
-def of_many_recordings() -> Sequence[_Option]:
-    """Return the options that three or more commands have alike."""
-    count = Counter(each for command in the_commands() for each in command.options)
-    return tuple(option for option, commands in count.items() if commands >= _SEVERAL)
 
 
 def exit_codes() -> Mapping[int, str]:

@@ -6,7 +6,6 @@ from contextlib import closing
 from typing import TYPE_CHECKING
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, exit_code, flush, put, remark, tell, tell_machine_or_bug
-from syncrelay.cli.fleet_options import add_fleet_options, require_into
 from syncrelay.cli.new_file import write_again, write_new, write_suggested
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from syncrelay.recordings.analysis import Analysis
-    from syncrelay.recordings.fleet.run import Run
 
 
 def parser() -> Parser:
@@ -43,15 +41,8 @@ def parser() -> Parser:
     parser.add_argument(
         "--json",
         action="store_true",
-        help="print all figures as JSON; of several recordings, each in one line; with --into the rows of its table",
+        help="print all figures as JSON; of several recordings, each in one line",
     )
-    parser.add_argument(
-        "--robot",
-        metavar="PATTERN",
-        help="with --into: where in a path the robot's name is, as in '{robot}/{day}/*.mcap'; default: the first folder"
-        " in which paths differ",
-    )
-    add_fleet_options(parser)
     return parser
 
 
@@ -59,69 +50,24 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     from syncrelay.config import load_text
     from syncrelay.config.source import read_source
     from syncrelay.recordings.bag import is_recording
-    from syncrelay.recordings.fleet.recordings import names_recordings
 
     config, *others = arguments.config or [None]
     if others:
         parser.error("--config was given more than once: analyze takes one file")
-    require_into(parser, arguments)
-    is_bag = is_recording if arguments.into is None else names_recordings
-    bags = [arguments.bag, *filter(is_bag, arguments.more)]
-    topics = tuple(word for word in arguments.more if not is_bag(word))
+    bags = [arguments.bag, *filter(is_recording, arguments.more)]
+    topics = tuple(word for word in arguments.more if not is_recording(word))
     if config is not None and topics:
         parser.error("name a file with --config FILE, or the topics to match, not both")
     if config is None and not topics and (arguments.write or arguments.html):
         parser.error("name a file with --config FILE, or the topics to match: there is nothing to write yet")
     text = None if config is None else read_source(config).text
-    if arguments.into is not None:
-        return _analyze_many(parser, arguments, bags, text, topics)
     if len(bags) > 1 and (arguments.write or arguments.html):
         parser.error(f"--write and --html are for one recording, found {len(bags)}")
-    if arguments.robot:
-        parser.error("--robot goes with --into")
     if len(bags) == 1:
         return _analyze(bags[0], arguments, text, topics, indent=2)
     if text is not None:
         load_text(text, name=config)
     return _analyze_in_turn(bags, arguments, text, topics)
-
-
-def _analyze_many(
-    parser: Parser, arguments: Namespace, bags: "Sequence[str]", text: str | None, topics: tuple[str, ...]
-) -> int:
-    """Leave an analysis of each recording in a folder, and a table of all of them where there are groups."""
-    from syncrelay.cli.fleet import do_on_many
-    from syncrelay.config.wording import counted
-    from syncrelay.recordings.fleet.robots import RobotPattern
-    from syncrelay.recordings.fleet.summary import Summary
-    from syncrelay.recordings.fleet.table import TABLE, fleet_rows, write_table
-    from syncrelay.recordings.fleet.tasks import AnalyzeTask
-    from syncrelay.urls import redacted
-
-    if arguments.write or arguments.html:
-        parser.error("--write and --html are for one recording, and --into is for many")
-    has_groups = text is not None or bool(topics)
-    if not has_groups and (arguments.json or arguments.robot):
-        parser.error("--json and --robot are about groups: name a file with --config FILE, or topics")
-    file = arguments.config[0] if arguments.config else None
-    task = AnalyzeTask.of(file=file, text=text, topics=topics)
-    if not has_groups:
-        return do_on_many(task, bags, arguments)
-    pattern = None if arguments.robot is None else RobotPattern.parse(arguments.robot)
-    folder, summary = arguments.into.rstrip("/"), Summary()
-
-    def finish(run: "Run", _sources: object) -> int:
-        for row in write_table(f"{folder}/{TABLE}", fleet_rows(folder, run.entries(), pattern)):
-            summary.take(row)
-            if arguments.json:
-                put(row.model_dump_json())
-        for line in () if arguments.json else summary.lines():
-            put(line)
-        rows = counted(summary.rows, "row")
-        remark(f"wrote {redacted(folder)}/{TABLE}: {rows}; docs/howto/fleet_report.md has ten queries")
-        return DONE
-
-    return do_on_many(task, bags, arguments, finish=finish)
 
 
 def _analyze_in_turn(bags: "Sequence[str]", arguments: Namespace, text: str | None, topics: tuple[str, ...]) -> int:

@@ -55,8 +55,7 @@ _BAGS: Final = "recordings"
 _ROBOT: Final = "a robot"
 _RECORDINGS: Final = Need("recordings")
 _TO_DRAW: Final = Need("top", "to draw on a terminal, where it prints text otherwise", lambda _: False)
-_TABLE: Final = Need("datasets", "for `--into`", lambda arguments: arguments.into is not None)
-_RAY: Final = Need("fleet", "for `--engine ray`", lambda given: given.engine == "ray" and given.into is not None)
+_RAY: Final = Need("fleet", "for `--engine ray`", lambda arguments: arguments.engine == "ray")
 
 COMMANDS: Final[Mapping[str, Command]] = {
     each.name: each
@@ -68,15 +67,8 @@ COMMANDS: Final[Mapping[str, Command]] = {
         Command(
             "init --from-bag BAG", "propose a file for a recording, or for a live graph", (_RECORDINGS,), works_on=_BAGS
         ),
-        Command(
-            "analyze BAG...",
-            "measure recordings, and suggest values that fit",
-            (_RECORDINGS, _TABLE, _RAY),
-            works_on=_BAGS,
-        ),
-        Command(
-            "replay BAG...", "run a file's groups on a recording, without ROS", (_RECORDINGS, _RAY), works_on=_BAGS
-        ),
+        Command("analyze BAG...", "measure recordings, and suggest values that fit", (_RECORDINGS,), works_on=_BAGS),
+        Command("replay BAG...", "run a file's groups on a recording, without ROS", (_RECORDINGS,), works_on=_BAGS),
         Command(
             "export BAG...",
             "write the matched sets of recordings as datasets",
@@ -85,6 +77,12 @@ COMMANDS: Final[Mapping[str, Command]] = {
                 Need("datasets", "for `--format parquet` and `lerobot`", lambda given: given.format != "mcap"),
                 _RAY,
             ),
+            works_on=_BAGS,
+        ),
+        Command(
+            "fleet COMMAND BAG...",
+            "analyze or replay many recordings, each by itself",
+            (_RECORDINGS, Need("datasets", "for `analyze`", lambda arguments: arguments.does == "analyze"), _RAY),
             works_on=_BAGS,
         ),
         Command("test FILE...", "run the tests of a configuration, without ROS", (_RECORDINGS,), works_on=_FILE),
@@ -127,6 +125,15 @@ def commands_help(*, are_all: bool) -> str:
         "\n".join(["others:", *others]) if are_all else "new here: syncrelay demo; all commands: syncrelay --help --all"
     )
     return "\n".join([*parts, last])
+
+
+def commands_with(option: str) -> str:
+    """Return which commands have an option, as the end of an error; empty if none has."""
+    from syncrelay.config.wording import all_of
+
+    options = {name: [each.option_strings for each in of.parser().actions] for name, of in COMMANDS.items()}
+    named = [f"`{name}`" for name, known in options.items() if any(option in strings for strings in known)]
+    return f": that is an option of {all_of(named)}" if named else ""
 
 
 def require_extras(command: Command, arguments: Namespace) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from syncrelay.cli.boundary import DONE, USAGE, put, say
-from syncrelay.cli.commands import COMMANDS, require_extras
+from syncrelay.cli.commands import COMMANDS, commands_with, require_extras
 from syncrelay.cli.parser import HelpRequested, Parser, for_recording
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import UsageError
@@ -46,7 +46,7 @@ def _run(name: str, words: Sequence[str], stop: StopRequest, parser: "Parser | N
     """Read the words, check that what they need is installed, and run the module of this name."""
     module = import_module(f"syncrelay.cli.{name}")
     parser = parser or module.parser()
-    arguments = parser.read(words)
+    arguments = parser.read(words, elsewhere=commands_with)
     if name in COMMANDS:
         require_extras(COMMANDS[name], arguments)
     command: Callable[[Parser, Namespace, StopRequest], int] = module.command

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
-from syncrelay.cli.fleet_options import add_fleet_options
+from syncrelay.cli.many_options import add_many_options
 from syncrelay.cli.parser import COMPRESSIONS, IMAGE_FORMATS, Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import UsageError
@@ -59,14 +59,21 @@ def parser() -> Parser:
         metavar="HOW",
         help="how Parquet and MCAP are packed: zstd (default), lz4, or none, the quickest: raw pixels pack badly",
     )
-    add_fleet_options(parser, "-o", "--output")
+    parser.add_argument(
+        "-o",
+        "--output",
+        dest="into",
+        required=True,
+        metavar="FOLDER",
+        help="do each recording by itself, unless its result is in FOLDER already; BAG may be a pattern, a folder, a"
+        " URL, or @FILE that lists them",
+    )
+    add_many_options(parser)
     return parser
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     parser.refuse_repeated(arguments.config)
-    if arguments.into is None:
-        parser.error("the following arguments are required: -o/--output")
     has_columns = bool(arguments.fields or arguments.images)
     if arguments.raw and has_columns:
         parser.error("--raw keeps each message as it is: --fields and --images do not go with it")
@@ -76,7 +83,7 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
         parser.error(f"--fields, --images and --raw are for tables: {why}")
     if arguments.compression and arguments.format == "lerobot":
         parser.error("--compression is for Parquet and MCAP: LeRobot's videos are packed already")
-    from syncrelay.cli.fleet import do_on_many
+    from syncrelay.cli.many import do_on_many
     from syncrelay.cli.run import require_groups
     from syncrelay.config import load
 
@@ -104,7 +111,7 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
 
 def _export_lerobot(config: "Config", arguments: Namespace) -> int:
     """Write a LeRobotDataset of all recordings into the folder of the arguments, from an episode of each."""
-    from syncrelay.cli.fleet import do_on_many
+    from syncrelay.cli.many import do_on_many
     from syncrelay.config.wording import counted
     from syncrelay.output_files import local_path
     from syncrelay.recordings.fleet.export_tasks import EPISODES, LerobotTask, join, require_own

@@ -1,126 +1,112 @@
-"""A command on many recordings: its progress, its end, its exit code."""
+"""`syncrelay fleet analyze|replay BAG... --into FOLDER`: a command on many recordings, each by itself."""
 
-import os
-import sys
-import time
 from argparse import Namespace
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack, closing
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING
 
-from syncrelay.cli.boundary import AT_FAULT, DONE, OUR_BUG, put, remark, say
-from syncrelay.cli.stop import Terminated
-from syncrelay.config.wording import counted
-from syncrelay.errors import SyncRelayError
-from syncrelay.output_files import local_path
-from syncrelay.printable import printable
-from syncrelay.recordings.fleet.job import Engine, Failed, Finished
-from syncrelay.recordings.fleet.local import LocalEngine
-from syncrelay.recordings.fleet.progress import Progress
-from syncrelay.recordings.fleet.recordings import find_sources
-from syncrelay.recordings.fleet.run import Others, Run
-from syncrelay.recordings.fleet.store import ResultStore
-from syncrelay.recordings.fleet.task import NOTES, PROBLEMS, Source, Task
-from syncrelay.urls import redacted
+from syncrelay.cli.boundary import DONE, put, remark
+from syncrelay.cli.many_options import add_many_options
+from syncrelay.cli.parser import COMPRESSIONS, Parser, add_what_if, faults_of
+from syncrelay.cli.stop import StopRequest
 
-_EVERY_S: Final = 10.0
-_CLEARED: Final = "\r\033[K"
+if TYPE_CHECKING:
+    from syncrelay.recordings.fleet.run import Run
 
-Finish: TypeAlias = Callable[[Run, Sequence[Source]], int]
-"""What is done with the results of all recordings, named in their order; returns an exit code."""
+_ANALYZE, _REPLAY = "analyze", "replay"
+# Options of one of the two, by their names among the arguments.
+_ONLY = {_ANALYZE: ("json", "robot"), _REPLAY: ("compression", "what_if", "seed")}
 
 
-def do_on_many(task: Task, words: Sequence[str], arguments: Namespace, *, finish: Finish | None = None) -> int:
-    """Do a task on all recordings that words name, into a folder, as the options of add_fleet_options say.
-
-    `finish` is called when nothing is left to do, while the folder is still locked. What it prints takes the place of
-    the summary on stdout. Returns the exit code: 1 if a recording is at fault. Raises SyncRelayError if a word names no
-    recording, or the folder cannot be used; with --strict also for the first recording that is at fault.
-    """
-    path, named = local_path(arguments.into), redacted(arguments.into)
-    with ExitStack() as opened:
-        store = None if path is not None else ResultStore(arguments.into.rstrip("/"))
-        if path is None:
-            path = Path(opened.enter_context(TemporaryDirectory(prefix="syncrelay-")))
-        into = Path(os.path.abspath(path))  # noqa: PTH100  a link keeps its name
-        sources = find_sources(words, into=into if store is None else store.url)
-        others = Others.REPLACED if arguments.overwrite else Others.REFUSED
-        run = opened.enter_context(
-            Run(task, sources, into=into, others=others, time_limit=arguments.time_limit, store=store)
-        )
-        if run.unreadable:
-            lines = counted(run.unreadable, "line")
-            remark(f"{named}: {lines} of its ledger cannot be read: what no other line has is done again")
-        progress = Progress(run.jobs, time.monotonic())
-        try:
-            code = _go(run, progress, arguments)
-            summary = printable(f"{named}: {progress.summary()}")
-            if finish is None:
-                put(summary)
-                return code
-            say(summary)
-            return max(code, finish(run, sources))
-        except (KeyboardInterrupt, Terminated) as ended:
-            name = "SIGTERM" if isinstance(ended, Terminated) else "SIGINT"
-            remark(f"ended by {name}: {progress.summary()}; the same command does the rest")
-            raise
+def parser() -> Parser:
+    parser = Parser(
+        "syncrelay fleet",
+        example="syncrelay fleet analyze bags --config fusion.yaml --into facts",
+        description="Does each of many recordings by itself, on all cores or on a cluster, and leaves its result in a "
+        "folder; the same command goes on where it was stopped. `analyze` ends with a table of all of them, `replay` "
+        "writes the sets of each; `syncrelay export` does the same for datasets. Exit code 1 if a recording is at "
+        "fault.",
+    )
+    parser.add_argument("does", metavar="COMMAND", choices=tuple(_ONLY), help="analyze or replay")
+    parser.add_argument("bag", metavar="BAG", help="a recording, a pattern, a folder, a URL, or @FILE that lists them")
+    parser.add_argument(
+        "more", metavar="BAG|TOPIC", nargs="*", default=[], help="more of them; for analyze also topics to match"
+    )
+    parser.add_argument("--into", required=True, metavar="FOLDER", help="where the results go; those there are kept")
+    parser.add_repeatable("--config", metavar="FILE", help="the file with the groups")
+    parser.add_argument("--json", action="store_true", help="with analyze: print the rows of its table as JSON")
+    parser.add_argument(
+        "--robot",
+        metavar="PATTERN",
+        help="with analyze: where in a path the robot's name is, as in '{robot}/{day}/*.mcap'; default: the first"
+        " folder in which paths differ",
+    )
+    parser.add_argument(
+        "--compression", choices=COMPRESSIONS, metavar="HOW", help="with replay: zstd (default), lz4 or none"
+    )
+    add_what_if(parser)
+    add_many_options(parser)
+    return parser
 
 
-def _go(run: Run, progress: Progress, arguments: Namespace) -> int:
-    """Do all jobs of a run, with progress on stderr: on a terminal in one line, elsewhere a line every 10 s."""
-    code, last, is_terminal = DONE, progress.begun, sys.stderr.isatty()
-    clear = _CLEARED if is_terminal else ""
-    try:
-        with closing(run.go(_engine(arguments))) as finished:
-            for each in finished:
-                if each is not None:
-                    sys.stderr.write(clear)
-                    code = max(code, _take(each, run, progress))
-                    if code and arguments.strict:
-                        raise SyncRelayError(f"ended at the first recording that is at fault: {progress.summary()}")
-                now = time.monotonic()
-                if is_terminal:
-                    sys.stderr.write(_CLEARED + progress.line(now))
-                    sys.stderr.flush()
-                elif now - last >= _EVERY_S:
-                    remark(progress.line(now))
-                    last = now
-    finally:
-        sys.stderr.write(clear)
-    return code
+def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
+    for does, names in _ONLY.items():
+        for name in names:
+            if does != arguments.does and getattr(arguments, name):
+                parser.error(f"--{name.replace('_', '-')} goes with fleet {does}")
+    return (_replay if arguments.does == _REPLAY else _analyze)(parser, arguments)
 
 
-def _engine(arguments: Namespace) -> Engine:
-    """Return what works on the recordings. Raises SyncRelayError if it is not installed."""
-    jobs = arguments.jobs or len(os.sched_getaffinity(0))
-    if arguments.engine == "local":
-        return LocalEngine(jobs=jobs)
-    from syncrelay.recordings.fleet.on_ray import RayEngine
+def _replay(parser: Parser, arguments: Namespace) -> int:
+    """Write the sets of each recording into a folder."""
+    parser.refuse_repeated(arguments.config)
+    if not arguments.config:
+        parser.error("the following arguments are required: --config")
+    faults, seed = faults_of(parser, arguments)
+    from syncrelay.cli.many import do_on_many
+    from syncrelay.config import load
+    from syncrelay.recordings.fleet.tasks import ReplayTask
 
-    return RayEngine(jobs=jobs)
+    task = ReplayTask.of(load(*arguments.config), faults, seed, arguments.compression or "zstd")
+    return do_on_many(task, [arguments.bag, *arguments.more], arguments)
 
 
-def _take(finished: Finished, run: Run, progress: Progress) -> int:
-    """Count a recording that has ended, say what is wrong with it, and return the exit code for it."""
-    job, outcome = finished
-    progress.take(finished)
-    name = job.source.shown
-    if isinstance(outcome, Failed):
-        if outcome.is_bug:
-            say(outcome.why)
-            remark(f"this is a bug in syncrelay; it happened with the recording {name}")
-            return OUR_BUG
-        remark(outcome.why)
-        if outcome.ends_all:
-            raise SyncRelayError(f"ended: {progress.summary()}")
-        return AT_FAULT
-    entry = run.entry(job)
-    facts = entry.facts if entry is not None else {}
-    problems = facts.get(PROBLEMS, [])
-    progress.faulty += bool(problems)
-    for sentence in map(str, [*problems, *facts.get(NOTES, [])]):
-        # A sentence about one of its files begins with the file's name.
-        remark(sentence if sentence.startswith(name) else f"{name}: {sentence}")
-    return AT_FAULT if problems else DONE
+def _analyze(parser: Parser, arguments: Namespace) -> int:
+    """Leave an analysis of each recording in a folder, and a table of all of them where there are groups."""
+    from syncrelay.cli.many import do_on_many
+    from syncrelay.config.source import read_source
+    from syncrelay.config.wording import counted
+    from syncrelay.recordings.fleet.recordings import names_recordings
+    from syncrelay.recordings.fleet.robots import RobotPattern
+    from syncrelay.recordings.fleet.summary import Summary
+    from syncrelay.recordings.fleet.table import TABLE, fleet_rows, write_table
+    from syncrelay.recordings.fleet.tasks import AnalyzeTask
+    from syncrelay.urls import redacted
+
+    file, *others = arguments.config or [None]
+    if others:
+        parser.error("--config was given more than once: analyze takes one file")
+    bags = [arguments.bag, *filter(names_recordings, arguments.more)]
+    topics = tuple(word for word in arguments.more if not names_recordings(word))
+    if file is not None and topics:
+        parser.error("name a file with --config FILE, or the topics to match, not both")
+    text = None if file is None else read_source(file).text
+    has_groups = text is not None or bool(topics)
+    if not has_groups and (arguments.json or arguments.robot):
+        parser.error("--json and --robot are about groups: name a file with --config FILE, or topics")
+    task = AnalyzeTask.of(file=file, text=text, topics=topics)
+    if not has_groups:
+        return do_on_many(task, bags, arguments)
+    pattern = None if arguments.robot is None else RobotPattern.parse(arguments.robot)
+    folder, summary = arguments.into.rstrip("/"), Summary()
+
+    def finish(run: "Run", _sources: object) -> int:
+        for row in write_table(f"{folder}/{TABLE}", fleet_rows(folder, run.entries(), pattern)):
+            summary.take(row)
+            if arguments.json:
+                put(row.model_dump_json())
+        for line in () if arguments.json else summary.lines():
+            put(line)
+        rows = counted(summary.rows, "row")
+        remark(f"wrote {redacted(folder)}/{TABLE}: {rows}; docs/howto/fleet_report.md has ten queries")
+        return DONE
+
+    return do_on_many(task, bags, arguments, finish=finish)

@@ -3,14 +3,17 @@
 import argparse
 import os
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import chain
 from textwrap import fill
-from typing import Any, Final, NoReturn
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from syncrelay.errors import UsageError
 from syncrelay.recording_files import holds_recording
 from syncrelay.yaml_files import yaml_files
+
+if TYPE_CHECKING:
+    from syncrelay.rig.what_if import Fault
 
 ROS_ARGS: Final = "--ros-args"
 _WIDTH: Final = 78
@@ -70,10 +73,10 @@ class Parser(argparse.ArgumentParser):
         text = f"{help}; may be repeated"
         self.add_argument(option, metavar=metavar, action="append", default=[], help=text, **more)
 
-    def read(self, words: Sequence[str]) -> argparse.Namespace:
+    def read(self, words: Sequence[str], *, elsewhere: Callable[[str], str] = lambda _: "") -> argparse.Namespace:
         """Return the arguments, with what follows --ros-args, which the parser may have, as `ros_args`.
 
-        An unknown argument is an error with the nearest valid option.
+        An unknown argument is an error with what `elsewhere` says of that option, else with the nearest valid one.
         """
         self.add_help_option()
         own, ros_args = self._split(words)
@@ -94,7 +97,8 @@ class Parser(argparse.ArgumentParser):
 
             word = unknown[0]
             options = [option for action in self._actions for option in action.option_strings]
-            hint = did_you_mean(word.partition("=")[0], options) if word.startswith("-") else ""
+            option = word.partition("=")[0]
+            hint = (elsewhere(option) or did_you_mean(option, options)) if word.startswith("-") else ""
             self.error(f"unknown argument {word}{hint}")
         arguments.ros_args = ros_args
         return arguments
@@ -174,3 +178,27 @@ def duration(text: str) -> int:
     if length <= 0:
         raise argparse.ArgumentTypeError(f"expected a duration above 0, found {text}")
     return length
+
+
+def add_what_if(parser: Parser) -> None:
+    """Add the faults that are laid over a recording."""
+    parser.add_repeatable(
+        "--what-if",
+        metavar="FAULT",
+        help="lay a fault over the recording, such as 'late: TOPIC 80ms' or 'drop: TOPIC 10%% from 12s'; also offset,"
+        " drift, dead",
+    )
+    parser.add_argument("--seed", metavar="N", type=seed, help="with --what-if: which messages are lost (0)")
+
+
+def faults_of(parser: Parser, arguments: argparse.Namespace) -> tuple[tuple["Fault", ...], int]:
+    """Return the faults that the arguments lay over a recording, and the seed of which messages are lost."""
+    from syncrelay.rig.what_if import parse_fault
+
+    try:
+        faults = tuple(map(parse_fault, arguments.what_if))
+    except ValueError as error:
+        parser.error(f"argument --what-if: {error}")
+    if arguments.seed is not None and not faults:
+        parser.error("--seed goes with --what-if")
+    return faults, arguments.seed or 0

@@ -6,8 +6,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, say
-from syncrelay.cli.fleet_options import add_fleet_options, require_into
-from syncrelay.cli.parser import COMPRESSIONS, Parser, seed
+from syncrelay.cli.parser import COMPRESSIONS, Parser, add_what_if, faults_of
 from syncrelay.cli.stop import StopRequest
 from syncrelay.printable import printable
 from syncrelay.urls import redacted
@@ -45,41 +44,16 @@ def parser() -> Parser:
     )
     parser.add_argument("--json", action="store_true", help="print a line of JSON for each set")
     parser.add_argument("--drops", action="store_true", help="print a line of JSON for each message that is dropped")
-    parser.add_repeatable(
-        "--what-if",
-        metavar="FAULT",
-        help="lay a fault over the recording, such as 'late: TOPIC 80ms' or 'drop: TOPIC 10%% from 12s'; also offset,"
-        " drift, dead",
-    )
-    parser.add_argument("--seed", metavar="N", type=seed, help="with --what-if: which messages are lost (0)")
-    add_fleet_options(parser)
+    add_what_if(parser)
     return parser
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     parser.refuse_repeated(arguments.config)
-    from syncrelay.rig.what_if import parse_fault
-
-    try:
-        what_if = tuple(map(parse_fault, arguments.what_if))
-    except ValueError as error:
-        parser.error(f"argument --what-if: {error}")
-    if arguments.seed is not None and not what_if:
-        parser.error("--seed goes with --what-if")
-    seed_of_faults = arguments.seed or 0
-    require_into(parser, arguments)
-    if arguments.compression and not (arguments.output or arguments.into):
-        parser.error("--compression goes with --output and --into")
-    if arguments.into is None:
-        return _replay(arguments, what_if, seed_of_faults)
-    if arguments.output or arguments.json or arguments.drops:
-        parser.error("--output, --json and --drops are for one replay: --into writes the sets of each recording")
-    from syncrelay.cli.fleet import do_on_many
-    from syncrelay.config import load
-    from syncrelay.recordings.fleet.tasks import ReplayTask
-
-    task = ReplayTask.of(load(*arguments.config), what_if, seed_of_faults, arguments.compression or "zstd")
-    return do_on_many(task, arguments.bags, arguments)
+    faults, seed = faults_of(parser, arguments)
+    if arguments.compression and not arguments.output:
+        parser.error("--compression goes with --output")
+    return _replay(arguments, faults, seed)
 
 
 def _replay(arguments: Namespace, what_if: "tuple[Fault, ...]", seed_of_faults: int) -> int:

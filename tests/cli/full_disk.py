@@ -22,11 +22,11 @@ _RIG = ("../rig.mcap", "--config", "../fusion.yaml")
 COMMANDS: Mapping[str, tuple[str, ...]] = {
     "replay -o FILE": ("replay", *_RIG, "-o", "sets.mcap"),
     "replay -o FOLDER": ("replay", *_RIG, "-o", "below/sets"),
-    "replay --into": ("replay", *_RIG, "--into", "many", "--jobs", "1"),
+    "fleet replay": ("fleet", "replay", *_RIG, "--into", "many", "--jobs", "1"),
     "demo --record": ("demo", "--record", "demo.mcap", "--seconds", "1"),
     "analyze --html": ("analyze", *_RIG, "--html", "report.html"),
     "analyze --write": ("analyze", *_RIG, "--write", "better.yaml"),
-    "analyze --into": ("analyze", *_RIG, "--into", "many", "--jobs", "1"),
+    "fleet analyze": ("fleet", "analyze", *_RIG, "--into", "many", "--jobs", "1"),
     "init": ("init", "--from-bag", "../rig.mcap", "-o", "new.yaml"),
     "export": ("export", *_RIG, "-o", "dataset", "--jobs", "1"),
     "export --format mcap": ("export", *_RIG, "-o", "dataset", "--jobs", "1", "--format", "mcap"),

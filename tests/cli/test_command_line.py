@@ -44,7 +44,7 @@ def test_the_help_of_a_command_fits_a_screen(command, tmp_path):
     lines = done.stdout.splitlines()
     assert max(map(len, lines)) <= 80
     # The relay's has a line for each command, and some have the options of many recordings.
-    assert len(lines) <= 24 + 25 * (command in {"", "analyze", "replay", "export", "tap"})
+    assert len(lines) <= 24 + 25 * (command in {"", "export", "fleet", "replay", "tap"})
 
 
 def test_without_a_word_it_says_how_on_stderr(tmp_path):

@@ -88,7 +88,7 @@ _WORDS = [
             "demo --record rig.mcap",
             "schema --test",
             "top --once",
-            "analyze drive.mcap --into sets --engine ray",
+            "fleet analyze drive.mcap --into sets --engine ray",
             "export drive.mcap --config fusion.yaml -o sets --format mcap",
         ),
     ),

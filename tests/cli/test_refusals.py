@@ -46,14 +46,19 @@ _REFUSED = f"""
 2 | analyze rig.mcap /camera --config f.yaml | name a file with --config FILE, or the topics to match, not both
 2 | analyze rig.mcap /camera | name 2 topics or more
 2 | analyze rig.mcap rig.mcap --config f.yaml --html new.html | --write and --html are for one recording, found 2
-2 | analyze rig.mcap --jobs 2 | --jobs goes with --into
-2 | analyze rig.mcap --engine ray | --engine goes with --into
-2 | analyze rig.mcap --into new --time-limit 0s | argument --time-limit: expected a duration above 0, found 0s
-2 | analyze rig.mcap --into new --json | --json and --robot are about groups
-2 | analyze rig.mcap --config f.yaml --into new --write x.yaml | --write and --html are for one recording
-2 | analyze rig.mcap --config f.yaml --into new --html x.html | --write and --html are for one recording
-2 | analyze rig.mcap --config f.yaml --robot '{{robot}}/*' | --robot goes with --into
-2 | analyze rig.mcap --config f.yaml --into new --robot '{{day}}/*' | --robot {{day}}/*: expected {{robot}} once
+2 | analyze rig.mcap --jobs 2 | unknown argument --jobs: that is an option of `export` and `fleet`
+2 | fleet analyze rig.mcap | the following arguments are required: --into
+2 | fleet analize rig.mcap --into new | argument COMMAND: invalid choice: 'analize'
+2 | fleet analyze rig.mcap --into new --time-limit 0s | argument --time-limit: expected a duration above 0, found 0s
+2 | fleet analyze rig.mcap --into new --json | --json and --robot are about groups
+2 | fleet analyze rig.mcap --config f.yaml --into new --compression none | --compression goes with fleet replay
+2 | fleet analyze rig.mcap --config f.yaml --config g.yaml --into new | --config was given more than once: analyze takes
+2 | fleet analyze rig.mcap /camera --config f.yaml --into new | name a file with --config FILE, or the topics to match,
+2 | fleet analyze rig.mcap --config f.yaml --into new --robot '{{day}}/*' | --robot {{day}}/*: expected {{robot}} once
+2 | fleet replay rig.mcap --into new | the following arguments are required: --config
+2 | fleet replay rig.mcap --config f.yaml --into new --robot x | --robot goes with fleet analyze
+2 | fleet replay rig.mcap --config f.yaml --into new --seed 1 | --seed goes with --what-if
+2 | fleet replay rig.mcap --config f.yaml --into new --time-limit 2 | argument --time-limit: `2` has no unit
 1 | analyze rig.mcap /camera /lidr | /lidr is not in the recording, did you mean `/lidar`?
 1 | analyze none.mcap /camera /lidar | none.mcap: no such file or folder
 1 | analyze {_LONG} /camera /lidar | {_LONG}: cannot be read: File name too long
@@ -64,12 +69,6 @@ _REFUSED = f"""
 2 | replay rig.mcap --config f.yaml --seed -1 | argument --seed: expected a whole number of 0 or more, found -1
 2 | replay rig.mcap --config f.yaml --what-if 'lat: /x 3ms' | argument --what-if: `lat: /x 3ms` is not a fault, did you
 2 | replay rig.mcap --config f.yaml --what-if 'dead: /lida' | `dead: /lida`: there is no topic `/lida`, did you mean
-2 | replay rig.mcap --config f.yaml --jobs 2 | --jobs goes with --into
-2 | replay rig.mcap --config f.yaml --strict | --strict goes with --into
-2 | replay rig.mcap --config f.yaml --overwrite | --overwrite goes with --into
-2 | replay rig.mcap --config f.yaml --time-limit 2min | --time-limit goes with --into
-2 | replay rig.mcap --config f.yaml --into new --time-limit 2 | argument --time-limit: `2` has no unit, expected one
-2 | replay rig.mcap --config f.yaml --into new -o x.mcap | --output, --json and --drops are for one replay
 1 | replay none.mcap --config f.yaml | none.mcap: no such file or folder
 1 | replay {_LONG} --config f.yaml | {_LONG}: cannot be read: File name too long
 1 | replay f.yaml --config f.yaml | f.yaml: is not a recording
@@ -92,7 +91,7 @@ _REFUSED = f"""
 2 | export rig.mcap --config f.yaml -o new --raw --images png | --raw keeps each message as it is
 2 | export rig.mcap --config f.yaml -o new --format mcap --raw | --fields, --images and --raw are for tables: --format
 2 | export rig.mcap --config f.yaml -o new --format lerobot --compression lz4 | --compression is for Parquet and MCAP
-2 | replay rig.mcap --config f.yaml --compression none | --compression goes with --output and --into
+2 | replay rig.mcap --config f.yaml --compression none | --compression goes with --output
 2 | observe --config a.yaml --config b.yaml --write new.yaml | --write goes with one --config FILE
 2 | observe --config conf --write new.yaml | --write goes with one --config FILE: conf has 2
 1 | observe --config f.yaml --write mine.yaml | mine.yaml: already exists and is not overwritten

@@ -160,8 +160,8 @@ def test_replay_and_analyze_say_what_is_missing_and_exit_1(drawn, folder, figure
 @pytest.mark.parametrize(
     ("command", "file"),
     [
-        (("replay", "--into"), "f.yaml"),
-        (("analyze", "--into"), "f.yaml"),
+        (("fleet replay", "--into"), "f.yaml"),
+        (("fleet analyze", "--into"), "f.yaml"),
         (("export", "-o"), "f.yaml"),
         (("export", "--format", "lerobot", "-o"), "lerobot.yaml"),
     ],
@@ -169,7 +169,7 @@ def test_replay_and_analyze_say_what_is_missing_and_exit_1(drawn, folder, figure
 def test_a_fleet_names_each_incomplete_recording_and_exits_1(command, file, drawn, folder):
     name, *options = command
     out = f"out-{'-'.join(command)}"
-    done = run(name, "bags", "--config", file, *options, out, folder=folder)
+    done = run(*name.split(), "bags", "--config", file, *options, out, folder=folder)
     assert done.returncode == 1, done.stderr
     said = {line.removeprefix("syncrelay: ") for line in done.stderr.splitlines()}
     for each in drawn:

@@ -143,7 +143,7 @@ def test_the_results_of_a_fleet_are_kept_in_a_store_and_done_once(folder):
 
 
 def test_the_table_of_facts_is_written_to_a_store(folder):
-    words = ["analyze", "rig.mcap", "nothing.mcap", "--config", "f.yaml", "--json", "--into"]
+    words = ["fleet", "analyze", "rig.mcap", "nothing.mcap", "--config", "f.yaml", "--json", "--into"]
     (folder / "nothing.mcap").write_bytes(b"")
     far, near = stored(folder, *words, "store://new"), run_here(*words, "here", folder=folder)
     assert (far.returncode, far.stdout) == (near.returncode, near.stdout) == (1, near.stdout), far.stderr

@@ -1,4 +1,4 @@
-"""What `replay --into`, `export --format mcap` and `analyze --into` do with each recording."""
+"""What `fleet replay`, `export --format mcap` and `fleet analyze` do with each recording."""
 
 import json
 from collections.abc import Sequence

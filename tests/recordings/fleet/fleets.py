@@ -29,8 +29,8 @@ def make_fleet(folder: Path, counts=(20, 30, 40)) -> Path:
 
 
 def replay_into(folder, *words, into="out", bags="bags"):
-    """Run `syncrelay replay --into` to its end."""
-    return run("replay", bags, "--config", FILE, "--into", into, *words, folder=folder)
+    """Run `syncrelay fleet replay` to its end."""
+    return run("fleet", "replay", bags, "--config", FILE, "--into", into, *words, folder=folder)
 
 
 def entries(out: Path) -> dict[str, dict]:

@@ -14,7 +14,7 @@ OBEDIENT = """
 import sys
 from argparse import Namespace
 from syncrelay.cli.boundary import guarded
-from syncrelay.cli.fleet import do_on_many
+from syncrelay.cli.many import do_on_many
 from syncrelay.cli.stop import Termination
 from tests.recordings.fleet.tasks import Obedient
 options = Namespace(into="out", engine=sys.argv[1], jobs=2, strict=False, overwrite=False, time_limit=None)

@@ -1,4 +1,4 @@
-"""`syncrelay replay --into` and `syncrelay analyze --into`."""
+"""`syncrelay fleet replay` and `syncrelay fleet analyze`."""
 
 import json
 import sys
@@ -42,7 +42,7 @@ def test_the_ledger_tells_what_became_of_each_input(done):
 
 
 def test_the_analyses_are_those_of_analyze_alone(done):
-    ended = run("analyze", "bags", "--config", FILE, "--into", "analyses", "--jobs", "1", folder=done)
+    ended = run("fleet", "analyze", "bags", "--config", FILE, "--into", "analyses", "--jobs", "1", folder=done)
     assert (ended.returncode, ended.stderr.splitlines()[0]) == (0, "analyses: 3 recordings: 3 done")
     bag = done / "bags" / "r1.mcap"
     alone = run("analyze", str(bag), "--config", FILE, "--json", folder=done)
@@ -53,7 +53,7 @@ def test_the_analyses_are_those_of_analyze_alone(done):
 
 @pytest.mark.parametrize("words", [TOPICS, ()])
 def test_analyses_need_no_file(words, done, tmp_path):
-    ended = run("analyze", "bags/*", *words, "--into", str(tmp_path / "out"), folder=done)
+    ended = run("fleet", "analyze", "bags/*", *words, "--into", str(tmp_path / "out"), folder=done)
     assert (ended.returncode, "3 recordings: 3 done" in (ended.stderr if words else ended.stdout)) == (0, True)
     alone = run("analyze", str(done / "bags" / "r0.mcap"), *words, "--json", folder=done)
     assert (result(tmp_path / "out", "r0") / "analysis.json").read_text() == alone.stdout
@@ -87,7 +87,7 @@ def test_a_change_of_the_file_needs_leave_to_replace(tmp_path):
 
 def test_a_variable_of_the_file_counts_as_its_text(done, tmp_path):
     (tmp_path / FILE).write_text(file_text(slop="${SLOP}"))
-    words = ("replay", str(done / "bags"), "--config", FILE, "--into", "out")
+    words = ("fleet", "replay", str(done / "bags"), "--config", FILE, "--into", "out")
     run(*words, folder=tmp_path, environ={"SLOP": "5ms"})
     refused = run(*words, folder=tmp_path, environ={"SLOP": "1ms"})
     assert "holds results of a file with other values" in refused.stderr
@@ -127,7 +127,7 @@ def test_a_recording_without_a_required_topic_is_told_each_time(tmp_path):
 
 
 def test_on_a_terminal_progress_is_one_line_that_is_gone_at_the_end(done, tmp_path):
-    words = ("replay", str(done / "bags"), "--config", str(done / FILE), "--into", "out")
+    words = ("fleet", "replay", str(done / "bags"), "--config", str(done / FILE), "--into", "out")
     with on_terminal([sys.executable, "-m", "syncrelay", *words], folder=tmp_path, environ={}) as terminal:
         assert terminal.wait_for_end() == 0
     shown = terminal.written.partition("out:")[0]

@@ -85,7 +85,19 @@ class Fleet:
             each.write(folder)
         for slop, into in (("5ms", "old"), ("20ms", "new")):
             (folder / FILE).write_text(file_text(slop=slop))
-            words = ("analyze", "bags", "--config", FILE, "--into", into, "--jobs", "2", "--robot", "{robot}/{day}/*")
+            words = (
+                "fleet",
+                "analyze",
+                "bags",
+                "--config",
+                FILE,
+                "--into",
+                into,
+                "--jobs",
+                "2",
+                "--robot",
+                "{robot}/{day}/*",
+            )
             self.ended = run(*words, folder=folder)
             assert self.ended.returncode == 1, self.ended.stderr
         self.as_json = run(*words, "--json", folder=folder).stdout
@@ -212,10 +224,10 @@ def test_a_lost_result_of_a_recording_that_is_not_named_is_an_error_that_can_be_
     for name in ("a", "b"):
         write_mcap(tmp_path / "bags" / f"{name}.mcap", at("/camera", 0))
     words = ("--config", FILE, "--into", "out", "--jobs", "1")
-    run("analyze", "bags", *words, folder=tmp_path)
+    run("fleet", "analyze", "bags", *words, folder=tmp_path)
     lost = result(tmp_path / "out", "b") / "facts.jsonl"
     lost.unlink()
-    ended = run("analyze", "bags/a.mcap", *others, *words, folder=tmp_path)
+    ended = run("fleet", "analyze", "bags/a.mcap", *others, *words, folder=tmp_path)
     told = (
         f"syncrelay: out/{lost.parent.name}/facts.jsonl: cannot be read: remove this folder, and run the command again"
         f" with {tmp_path}/bags/b.mcap among the recordings\n"

@@ -49,7 +49,21 @@ def test_it_leaves_what_this_machines_cores_leave(isolated, tmp_path):
     make_fleet(tmp_path)
     (tmp_path / "bags" / "bad.mcap").write_bytes(b"")
     local = replay_into(tmp_path, into="local")
-    words = ("-m", "syncrelay", "replay", "bags", "--config", FILE, "--engine", "ray", "--jobs", "2", "--into", "ray")
+    words = (
+        "-m",
+        "syncrelay",
+        "fleet",
+        "replay",
+        "bags",
+        "--config",
+        FILE,
+        "--engine",
+        "ray",
+        "--jobs",
+        "2",
+        "--into",
+        "ray",
+    )
     ended = isolated(*words, folder=tmp_path)
     assert (ended.returncode, ended.stdout) == (1, "ray: 4 recordings: 3 done, 1 failed\n")
     assert local.stderr in ended.stderr
@@ -121,7 +135,7 @@ def test_a_cluster_that_cannot_be_reached_is_told(isolated, tmp_path):
     script = (
         "import os, sys; from syncrelay.cli import main; os.environ['RAY_ADDRESS'] = '10.99.0.1:9'; sys.exit(main())"
     )
-    words = ("replay", "bags", "--config", FILE, "--engine", "ray", "--into", "out")
+    words = ("fleet", "replay", "bags", "--config", FILE, "--engine", "ray", "--into", "out")
     ended = isolated("-c", script, *words, folder=tmp_path)
     assert ended.returncode == 1
     assert "syncrelay: the Ray cluster 10.99.0.1:9 of RAY_ADDRESS cannot be reached: " in ended.stderr
@@ -187,7 +201,7 @@ def test_a_node_that_is_lost_midway_loses_and_doubles_nothing(isolated, tmp_path
     (tmp_path / "bags").mkdir()
     for number in range(_RECORDINGS):
         record(str(tmp_path / "bags" / f"r{number}.mcap"), 1.0, number)
-    words = ("replay", "bags", "--config", FILE)
+    words = ("fleet", "replay", "bags", "--config", FILE)
     local = [sys.executable, "-m", "syncrelay", *words, "--into", "local"]
     environ = {**os.environ, "PYTHONPATH": str(ROOT)}
     subprocess.run(local, cwd=tmp_path, env=environ, timeout=3000, check=True, capture_output=True)
