@@ -92,14 +92,12 @@ class BundleOutlet:
     """Publishes the sets of a group as bundles. On the receive thread."""
 
     def __init__(
-        self, bundle: Bundle, outlet: Outlet, refused: Callable[[Outlet, str | None], None], *, is_alone: bool
+        self, bundle: Bundle, outlet: Outlet, note: Callable[[Outlet, UnfitError | PublishError | None], None]
     ) -> None:
-        """Have `refused` told why a bundle could not be published, and None of each that was."""
-        self.is_alone: Final = is_alone
-        """Whether the messages of a set leave in bundles only."""
+        """Have `note` hear of each bundle why it could not be published, or None."""
         self._bundle = bundle
         self._outlet = outlet
-        self._refused = refused
+        self._note = note
 
     @property
     def sent(self) -> int:
@@ -109,9 +107,9 @@ class BundleOutlet:
     def send(self, match: Match, number: int) -> None:
         """Publish a set, the one with this number."""
         contents = [None if message is None else message.payload.content() for message in match.messages]
-        why = None
+        failed = None
         try:
             self._outlet.send_content(self._bundle.content(contents, match.stamps, match.stamp, number))
         except (UnfitError, PublishError) as error:
-            why = str(error)
-        self._refused(self._outlet, why)
+            failed = error
+        self._note(self._outlet, failed)

@@ -40,10 +40,14 @@ class Watched(NamedTuple):
 
 
 class Unpublished(NamedTuple):
-    """How many messages of an input could not be published one after the other, and why the last one could not."""
+    """How many messages of an input could not be published one after the other, and why the last one could not.
+
+    `is_unfit` says that it, or its type, does not fit the bundle; else DDS refused.
+    """
 
     messages: int
     why: str
+    is_unfit: bool = False
 
 
 class Refusals:
@@ -54,10 +58,10 @@ class Refusals:
         """The inputs of which the last message could not be published."""
         self._group = group
 
-    def refused(self, index: int, outlet: Outlet, why: str) -> None:
+    def refused(self, index: int, outlet: Outlet, why: str, *, is_unfit: bool = False) -> None:
         """Note that an outlet did not publish a message of this input."""
         before = self.unpublished.get(index)
-        self.unpublished[index] = Unpublished(1 + (before.messages if before else 0), why)
+        self.unpublished[index] = Unpublished(1 + (before.messages if before else 0), why, is_unfit)
         if before is None:
             _LOG.error(
                 "%s: a message could not be published on %s: %s; trying again with the next one",

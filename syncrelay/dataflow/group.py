@@ -6,10 +6,11 @@ from collections.abc import Callable, Hashable, Mapping
 from contextlib import suppress
 from typing import NamedTuple, TypeVar
 
+from syncrelay.cdr_assembly import UnfitError
 from syncrelay.clock import Step
 from syncrelay.config import GroupConfig
 from syncrelay.config.installed import policy_name, suspects
-from syncrelay.dataflow.backend import Outlet
+from syncrelay.dataflow.backend import Outlet, PublishError
 from syncrelay.dataflow.bundle import Bundle, BundleOutlet
 from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
 from syncrelay.dataflow.flow import Engine, Flow, Refusals, Unpublished
@@ -142,17 +143,20 @@ class GroupRelay:
         if self._manifests is not None:
             self._manifests.publish_noted()
         is_alone = not self.config.options.outputs
-        self.flow.bundle = BundleOutlet(bundle, outlet, self._note_bundle, is_alone=is_alone)
+        self.flow.bundle = BundleOutlet(bundle, outlet, self._note_bundle)
+        self._refusals.unpublished.pop(self.bundle_index, None)
         if is_alone:
             self.flow.restamped = list(bundle.restamped)
 
-    def disconnect_bundle(self) -> None:
-        """Publish no bundles from now on."""
+    def disconnect_bundle(self, why: str) -> None:
+        """Publish no bundles from now on, for this reason."""
         self.flow.bundle = None
+        self._refusals.unpublished[self.bundle_index] = Unpublished(0, why)
 
-    def _note_bundle(self, outlet: Outlet, why: str | None) -> None:
-        if why is not None:
-            self._refusals.refused(self.bundle_index, outlet, why)
+    def _note_bundle(self, outlet: Outlet, error: UnfitError | PublishError | None) -> None:
+        if error is not None:
+            is_unfit = isinstance(error, UnfitError)
+            self._refusals.refused(self.bundle_index, outlet, str(error), is_unfit=is_unfit)
         elif self.unpublished:
             self._refusals.accepted(self.bundle_index, outlet)
 

@@ -33,7 +33,8 @@ class Note(NamedTuple):
 
     `common` is the stamp that the set was given, if any. The stamp of a missing input is None. A message is the
     `sent`-th of its output, from 1; that of one that could not be published is 0, and `unpublished` says why, by its
-    input. Of a group with a bundle, the set left as the `bundle`-th of these; 0 if that could not be published.
+    input. Of a group with a bundle, the set left as the `bundle`-th of these; 0 if that could not be published, of
+    which `unpublished` says why behind all inputs where these have outputs of their own.
     """
 
     number: int
@@ -67,6 +68,8 @@ class ManifestWriter:
         self._policy = _last_text(config.options.policy)
         self.is_by_header = tuple(topic.is_by_header for topic in config.topics)
         """Of which inputs a message's stamp is the one in its header."""
+        self.has_bundles_alone = not config.options.outputs
+        """Whether the messages of a set leave in bundles only."""
         self._offsets = tuple(topic.offset_ns for topic in config.topics)
         self._names = [(_text(output), _text(source)) for source, output in topics]
         self._bundle = None if bundle is None else _text(bundle)
@@ -87,20 +90,22 @@ class ManifestWriter:
         values = [value for row in rows if row[1] is not None for value in row]
         kinds = tuple([None if stamp is None else unpublished.get(index, "") for index, stamp in enumerate(stamps)])
         digits = list(map(b"%d".__mod__, [*numbers, *values]))
-        key = (common is None, kinds, *map(len, digits))
-        template = self._templates.get(key) or self._template(key, digits, kinds, has_common=common is not None)
+        unbundled = unpublished.get(len(stamps))
+        key = (common is None, kinds, unbundled, *map(len, digits))
+        template = self._templates.get(key) or self._template(key, digits, kinds, unbundled)
         return template % (_BEGIN(0, 1, 0, 0, *divmod(header, _NS_PER_SECOND)), *digits)
 
     def _template(
-        self, key: tuple[object, ...], digits: Sequence[bytes], kinds: Sequence[str | None], *, has_common: bool
+        self, key: tuple[object, ...], digits: Sequence[bytes], kinds: Sequence[str | None], unbundled: str | None
     ) -> bytes:
         """Return what the stamp and these digits, or others of their lengths, are filled into, and keep it."""
         sizes = iter([len(each) for each in digits])
+        has_no_common = key[0]
         # None is the place of digits.
-        parts: list[bytes | None] = [None, self._head(kinds.count(None), sum(map(bool, kinds)))]
+        parts: list[bytes | None] = [None, self._head(kinds.count(None), sum(map(bool, kinds)), unbundled)]
         for name in ("set", "missing", "span_ns", "latency_ns"):
             parts += (_key(name), *_number(next(sizes)))
-        parts += (_key("common_stamp_ns"), *(_number(next(sizes)) if has_common else (_text(""),)))
+        parts += (_key("common_stamp_ns"), *((_text(""),) if has_no_common else _number(next(sizes))))
         if self._bundle is not None:
             parts += (_key("bundle"), self._bundle, _key("bundle_sequence"), *_number(next(sizes)))
         parts += (_key("policy"), self._policy)
@@ -121,12 +126,13 @@ class ManifestWriter:
         self._templates[key] = template
         return template
 
-    def _head(self, missing: int, unpublished: int) -> bytes:
+    def _head(self, missing: int, unpublished: int, unbundled: str | None) -> bytes:
         """Return what comes before the set's number: an empty frame_id, how many statuses, the first one's begin."""
         of = len(self._names)
         faults = [f"{missing} of {of} missing"] if missing else []
         faults += [f"{unpublished} of {of} not published"] if unpublished else []
-        level = _ERROR if unpublished else _WARN if missing else _OK
+        faults += [f"bundle not published: {unbundled[:_LONGEST]}"] if unbundled is not None else []
+        level = _ERROR if unpublished or unbundled is not None else _WARN if missing else _OK
         message = _text(", ".join(faults) or "complete")
         version = _COUNT(7 if self._bundle is None else 9) + _key("version") + _text(str(_VERSION))
         return _text("") + _COUNT(1 + of) + _level(level, 0) + self._name + message + self._node + version

@@ -6,7 +6,7 @@ of manifests costs far less than the same manifests one by one.
 
 import logging
 from collections import deque
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection
 from typing import Final
 
 from syncrelay.config.wording import counted
@@ -25,9 +25,9 @@ MOST_NOTED: Final = 10_000
 """How many manifests of all groups may wait to be published: those of ten seconds at 1000 sets a second."""
 
 
-def _noted(flow: Flow, match: Match, latency: int, is_by_header: Sequence[bool]) -> Note:
+def _noted(flow: Flow, match: Match, latency: int, writer: ManifestWriter) -> Note:
     """Note what the manifest of the set that was just sent tells. Its payloads are not kept: they may be large."""
-    common, stamps = match.stamp, match.stamps
+    common, stamps, is_by_header = match.stamp, match.stamps, writer.is_by_header
     left_as = stamps
     if common is not None:
         pairs = zip(stamps, flow.restamped, strict=True)
@@ -42,23 +42,16 @@ def _noted(flow: Flow, match: Match, latency: int, is_by_header: Sequence[bool])
             ]
         )
     received = [None if message is None else message.payload.received for message in match.messages]
-    sent, unpublished = _sent(flow, len(stamps))
-    bundle = 0 if flow.bundle is None or len(stamps) in flow.unpublished else flow.bundle.sent
-    return Note(flow.n_sets, latency, common, stamps, left_as, received, sent, unpublished, bundle)
-
-
-def _sent(flow: Flow, n_inputs: int) -> tuple[Sequence[int], Mapping[int, str]]:
-    """Return which message of its topic that of each input was, and why those that are 0 were not published."""
     unpublished = {index: each.why for index, each in flow.unpublished.items()}
-    bundle = flow.bundle
-    if bundle is not None and bundle.is_alone:
-        unpublished = dict.fromkeys(range(n_inputs), *unpublished.values()) if unpublished else {}
-        sent = [bundle.sent] * n_inputs
+    bundle = 0 if flow.bundle is None or len(stamps) in unpublished else flow.bundle.sent
+    if writer.has_bundles_alone:
+        sent = [bundle] * len(stamps)
+        unpublished = dict.fromkeys(range(len(stamps)), *unpublished.values()) if unpublished else {}
     else:
         sent = [0 if outlet is None else outlet.sent for outlet in flow.outlets]
     if unpublished:
         sent = [0 if index in unpublished else count for index, count in enumerate(sent)]
-    return sent, unpublished
+    return Note(flow.n_sets, latency, common, stamps, left_as, received, sent, unpublished, bundle)
 
 
 class GroupManifests:
@@ -79,7 +72,7 @@ class GroupManifests:
     def tell(self, flow: Flow, match: Match, latency: int) -> None:
         """Have a manifest published of the set that a flow just sent, if anyone subscribes. On the receive thread."""
         if self.is_heard and len(self._noted) < MOST_NOTED:
-            self._noted.append((self, _noted(flow, match, latency, self._writer.is_by_header)))
+            self._noted.append((self, _noted(flow, match, latency, self._writer)))
         elif self.is_heard:
             self._left_out += 1
 

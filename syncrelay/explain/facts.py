@@ -86,7 +86,7 @@ class Refusal:
     """A publisher or subscription that DDS does not make.
 
     `verb` is what cannot be done with the topic. `held_as` is the type that this process has the topic as already,
-    where that is the reason; else `why` is what DDS says.
+    where that is the reason; else `why` is what DDS says, or, where it `is_unfit`, why a bundle cannot be of the type.
     """
 
     verb: str
@@ -94,12 +94,17 @@ class Refusal:
     type: str
     held_as: str | None = None
     why: str = ""
+    is_unfit: bool = False
 
     @property
     def text(self) -> str:
         """The whole in words."""
-        reason = f"this process has it as {self.held_as} already" if self.held_as else self.why
-        return f"the relay cannot {self.verb} {self.topic} as {self.type}: {reason}"
+        return f"the relay cannot {self.verb} {self.topic} as {self.type}: {self.reason}"
+
+    @property
+    def reason(self) -> str:
+        """Why, in words."""
+        return f"this process has it as {self.held_as} already" if self.held_as else self.why
 
 
 @dataclass(frozen=True, slots=True)

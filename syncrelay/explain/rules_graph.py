@@ -7,7 +7,7 @@ from syncrelay.config.installed import suspects
 from syncrelay.config.wording import all_of, one_of
 from syncrelay.explain import words
 from syncrelay.explain.codes import Severity
-from syncrelay.explain.facts import NO_SECOND, Endpoint, GraphSnapshot, GroupFacts, InputFacts, serving
+from syncrelay.explain.facts import NO_SECOND, Endpoint, GraphSnapshot, GroupFacts, InputFacts, Refusal, serving
 from syncrelay.explain.findings import SECOND, Fault, Found, absence, blocks
 from syncrelay.sync.messages import DropReason
 
@@ -48,22 +48,25 @@ def inactive(facts: GroupFacts) -> Found:
 def refused_by_dds(_facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find a topic that DDS lets the group not subscribe to or publish."""
     if (refusal := an_input.graph.refusal) is not None:
-        yield Fault(
-            refusal.text,
-            "give one of the two another name: a process has one type for each topic"
-            if refusal.held_as
-            else "the relay tries again every 5 s; if this goes on, check the limits on memory and open files",
-            Severity.ERROR if an_input.required else Severity.WARN,
-        )
+        yield Fault(refusal.text, _what_helps(refusal), Severity.ERROR if an_input.required else Severity.WARN)
+
+
+def _what_helps(refusal: Refusal) -> str:
+    if refusal.held_as:
+        return "give one of the two another name: a process has one type for each topic"
+    return "the relay tries again every 5 s; if this goes on, check the limits on memory and open files"
 
 
 def no_bundle(facts: GroupFacts) -> Found:
     """Find that the sets do not leave as one message each, as they should."""
     if facts.unbundled is not None:
+        refusal = facts.unbundled.refusal
         yield Fault(
-            facts.unbundled.refusal.text.splitlines()[0],
+            refusal.text.splitlines()[0],
             "build its package from the definitions that the inputs' publishers use, and source it where the relay"
-            " runs: it tries again every 5 s",
+            " runs: it tries again every 5 s"
+            if refusal.is_unfit
+            else _what_helps(refusal),
             Severity.ERROR if facts.unbundled.is_alone else Severity.WARN,
         )
 

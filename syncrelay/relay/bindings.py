@@ -42,6 +42,8 @@ class GroupBinding:
         missing = ", ".join(filter(None, (each.missing for each in self.inputs if each.output.index in needed)))
         if self.group.sleeps and self.publishers and not missing:
             return f"a subscriber of {one_of(each.topic_name for each in self.publishers)}"
+        if not missing and self.bundle.refusal is not None and not self.group.config.options.outputs:
+            return f"its bundle, which cannot leave on {self.bundle.refusal.topic}"
         return missing or None
 
     def feed(self) -> None:

@@ -131,7 +131,7 @@ class Bundles:
                 self._make(group, config, profile)
                 self._end(before)
         except _UNFIT as error:
-            self._refuse(group, Refusal("publish", config.topic, config.type, why=str(error)))
+            self._refuse(group, Refusal("publish", config.topic, config.type, why=str(error), is_unfit=True))
         except RefusedError as error:
             self._refuse(group, error.refusal)
         else:
@@ -160,10 +160,8 @@ class Bundles:
         self._refusals[group] = refusal
         self._refused_at = self._runtime.monotonic()
         self._once.log(logging.ERROR, refusal.text)
-        made = self._made.pop(group, None)
-        if made is not None:
-            self._loop.call(group.disconnect_bundle).result()
-            self._end(made)
+        self._loop.call(lambda: group.disconnect_bundle(refusal.reason.splitlines()[0])).result()
+        self._end(self._made.pop(group, None))
 
     def _require_definitions(self, config: BundleConfig, topics: Sequence[TopicInput]) -> None:
         """Raise BundleError for an input whose publisher has another definition of its type than this process."""

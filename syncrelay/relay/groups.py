@@ -234,7 +234,7 @@ class Groups:
             # The names after all remaps, as the graph shows them.
             pairs = [(each.topic.name, self._node.resolve_topic(each.output.topic)) for each in binding.inputs]
             bundle = binding.group.config.bundle
-            if bundle is not None and binding.group.config.options.outputs:
+            if bundle is not None and binding.group.config.options.outputs and binding.bundle.refusal is None:
                 pairs.append(("whole sets", self._node.resolve_topic(bundle.topic)))
             flow = ", ".join(f"{topic} -> {output}" for topic, output in pairs)
             text = f"waiting for {waiting_for}" if waiting_for else f"running: {flow}"

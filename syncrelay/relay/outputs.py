@@ -56,8 +56,9 @@ class Output:
 
     @property
     def waits_for_bundle(self) -> bool:
-        """Whether its messages could not leave yet, because the bundle's publisher is about to be made."""
-        return not self.is_separate and self.group.flow.bundle is None and self.bundle.refusal is None
+        """Whether sets would leave without their bundle, because its publisher is about to be made."""
+        has_bundle, flow = self.group.config.bundle is not None, self.group.flow
+        return has_bundle and flow.bundle is None and self.bundle.refusal is None
 
     def outlet(self, backend: RclBackend) -> Outlet:
         """Return the outlet of its publisher: the same for as long as that is, so that it counts what was sent."""

@@ -149,4 +149,5 @@ def _unpublished(binding: InputBinding, output: str) -> Refusal | None:
 
 
 def _refused(last: Unpublished, output: str, type_name: str) -> Refusal:
-    return Refusal("publish", output, type_name, why=f"{last.why} ({counted(last.messages, 'message')} so far)")
+    why = f"{last.why} ({counted(last.messages, 'message')} so far)"
+    return Refusal("publish", output, type_name, why=why, is_unfit=last.is_unfit)

@@ -51,8 +51,9 @@ PATHS_TOLD: Final[Mapping[str, str]] = {
     "/livez": f"200 while the receive loop turns, 503 once it has not for {_STALLED_S:.0f} s.",
     "/readyz": (
         "200 while the relay runs (not paused, not ending, and active if it is a managed node), no group is stopped or"
-        " refused by DDS, and every required input has a publisher that fits; with `metrics: {ready: {share: 0.8}}`"
-        " also only while every group gives that share of its possible sets. 503 otherwise."
+        " refused by DDS or lacks its bundle, and every required input has a publisher that fits; with"
+        " `metrics: {ready: {share: 0.8}}` also only while every group gives that share of its possible sets. 503"
+        " otherwise."
     ),
 }
 """The paths and what they give; docs/reference/metrics.md is made of this."""

@@ -74,7 +74,7 @@ def advice(phase: Phase, node: str) -> str | None:
 
 
 def is_ready(state: RelayState) -> bool:
-    """Whether the relay runs or observes, is not paused, and every required input is served and let through.
+    """Whether the relay runs or observes, is not paused, every required input is served, and all is let through.
 
     Where the file asks for it, also whether every group that is awake gives its share of the possible sets.
     """
@@ -83,7 +83,7 @@ def is_ready(state: RelayState) -> bool:
         state.phase in (Phase.RUNNING, Phase.OBSERVING)
         and bool(state.groups)
         and not state.unjudged
-        and all(report.facts.failure is None for report in state.groups)
+        and all(report.facts.failure is None and report.facts.unbundled is None for report in state.groups)
         and all(_is_served(each) for each in inputs)
         and (state.ready_share is None or all(_gives(report, state.ready_share) for report in state.groups))
     )

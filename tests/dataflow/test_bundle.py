@@ -8,11 +8,15 @@ import pytest
 from syncrelay.cdr_assembly import ENCAPSULATION
 from syncrelay.config import load_text
 from syncrelay.dataflow.backend import PublishError
+from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.bundle import Bundle, BundleError
 from syncrelay.dataflow.group import GroupRelay
-from tests.dataflow.payloads import FLOWS, Outlet
+from syncrelay.dataflow.manifest import ManifestWriter
+from syncrelay.dataflow.manifest_queue import ManifestQueue
+from tests.dataflow.payloads import FLOWS, Outlet, connect
 from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.configs import config, inputs
+from tests.ros.manifests import ERROR, OK, read
 from tests.ros.streams import BEGIN, MS
 
 _HEADER = {"stamp": "builtin_interfaces/Time", "frame_id": "string"}
@@ -47,7 +51,7 @@ def _bundle(group: GroupRelay) -> Bundle:
 
 
 def _payload(content: bytes):
-    return SimpleNamespace(content=lambda: content, received=BEGIN)
+    return SimpleNamespace(name=content, content=lambda: content, received=BEGIN)
 
 
 def _whole(number: int, left: bytes, right: bytes, missing: bytes, *stamps: int) -> bytes:
@@ -76,10 +80,22 @@ def test_each_set_is_published_once_with_its_number_and_what_is_missing(flow):
 
 
 @pytest.mark.parametrize("flow", FLOWS)
-def test_what_cannot_be_bundled_is_told_until_a_set_leaves_again(flow):
-    group, outlet = _group(flow), Outlet()
-    group.connect_bundle(_bundle(group), outlet)
+@pytest.mark.parametrize("outputs", [True, False])
+def test_what_cannot_be_bundled_is_told_until_a_set_leaves_again(flow, outputs):
+    group, outlet, manifest = _group(flow, outputs=outputs), Outlet(), Outlet()
+    topics = [(each.topic, each.output) for each in group.config.topics]
+    queue = ManifestQueue(bugs=Bugs())
+    group.tell_sets(
+        queue.begin("front", ManifestWriter(group.config, node="/n", topics=topics, bundle="/set"), manifest)
+    )
+    if outputs:
+        connect(group, [Outlet(), Outlet()])
     good = vector(BEGIN)
+    group.disconnect_bundle("no type")
+    for index in (0, 1):
+        group.flow.receive(index, _payload(good), BEGIN - MS)
+    group.connect_bundle(_bundle(group), outlet)
+    assert not group.unpublished
     for stamp, content, refusal in (
         (BEGIN, good[:-1], None),
         (BEGIN + MS, good, PublishError("no room")),
@@ -87,12 +103,22 @@ def test_what_cannot_be_bundled_is_told_until_a_set_leaves_again(flow):
         outlet.refusal = refusal
         for index in (0, 1):
             group.flow.receive(index, _payload(content), stamp)
-    assert group.unpublished[group.bundle_index] == (2, "no room")
+    assert group.unpublished[group.bundle_index] == (2, "no room", False)
     outlet.refusal = None
     for index in (0, 1):
         group.flow.receive(index, _payload(good), BEGIN + 2 * MS)
     assert not group.unpublished
-    assert (group.flow.n_sets, outlet.sent, group.failure) == (3, 1, None)
+    assert (group.flow.n_sets, outlet.sent, group.failure) == (4, 1, None)
+    queue.publish()
+    told = [read(each) for each in manifest.log]
+    whys = ["no type", "left is cut off, or of another type", "no room"]
+    said = [f"bundle not published: {why}" for why in whys] if outputs else ["2 of 2 not published"] * 3
+    assert [(each.level, each.message) for each in told] == [*((ERROR, each) for each in said), (OK, "complete")]
+    assert [each.bundle_sequence for each in told] == ["0", "0", "0", "1"]
+    if outputs:
+        assert {one.message for each in told for one in each.inputs} == {""}
+    else:
+        assert [{one.message for one in each.inputs} for each in told] == [*({why} for why in whys), {""}]
 
 
 def test_an_input_without_a_field_is_refused():

@@ -9,6 +9,7 @@ import pytest
 
 from syncrelay.dataflow.backend import PublishError
 from syncrelay.dataflow.bugs import Bugs, OnceLog
+from syncrelay.dataflow.flow import Unpublished
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.inbox import PolledInbox
 from syncrelay.dataflow.receive import ReceiveLoop
@@ -121,7 +122,7 @@ def test_a_message_that_cannot_be_published_is_counted_and_told_and_the_group_go
         for index in range(2):
             group.flow.receive(index, Named(b"%d" % n), BEGIN + n * MS)
         told.append(dict(group.unpublished))
-    assert told == [{}, {}, {1: (1, "no memory")}, {1: (2, "no memory")}, {}]
+    assert told == [{}, {}, {1: Unpublished(1, "no memory")}, {1: Unpublished(2, "no memory")}, {}]
     assert [outlet.log for outlet in outlets] == [[b"0", b"1", b"2", b"3", b"4"], [b"0", b"1", b"4"]]
     assert group.failure is None
     assert [record.message for record in caplog.records] == [

@@ -25,18 +25,25 @@ def test_others_read_what_was_written(data, name, node, number, latency):
     common = data.draw(st.one_of(st.none(), _STAMPS))
     topics = [(f"/{each}", f"/out/{each}") for each in tokens]
     bundle = data.draw(st.one_of(st.none(), _NAMES.map("/{}".format)))
+    unbundled = data.draw(st.one_of(st.none(), _WHY)) if bundle else None
     config = group_of(name=name, topics=[each for each, _ in topics]).config
     writer = ManifestWriter(config, node=f"/{node}", topics=topics, bundle=bundle)
-    payload = writer.write(note(number, members, common=common, latency=latency)._replace(bundle=number - 1))
+    given = note(number, members, common=common, latency=latency)._replace(bundle=number - 1)
+    if unbundled is not None:
+        given = given._replace(unpublished={**given.unpublished, len(members): unbundled})
+    payload = writer.write(given)
 
     told = read(payload)
     stamps = [each.original_stamp for each in members if each is not None]
     missing, unpublished = members.count(None), sum(bool(each and each.why_not) for each in members)
     counts = {"missing": missing, "not published": unpublished}
-    faults = ", ".join(f"{count} of {len(members)} {what}" for what, count in counts.items() if count)
+    faults = ", ".join(
+        [f"{count} of {len(members)} {what}" for what, count in counts.items() if count]
+        + ([] if unbundled is None else [f"bundle not published: {unbundled}"])
+    )
     assert told._replace(inputs=()) == Told(
         stamp=max(stamps) if common is None else common,
-        level=ERROR if unpublished else WARN if missing else OK,
+        level=ERROR if unpublished or unbundled is not None else WARN if missing else OK,
         group=name,
         message=faults or "complete",
         node=f"/{node}",

@@ -11,7 +11,7 @@ from waitress.trigger import trigger
 
 from syncrelay.config.listen import Listen
 from syncrelay.errors import ListenError
-from syncrelay.explain import Endpoint, GroupReport, Mismatch, Refusal, Share, Tape
+from syncrelay.explain import Endpoint, GroupReport, Mismatch, Refusal, Share, Tape, Unbundled
 from syncrelay.status import Phase, Taps, server
 from syncrelay.status.announcement import announced
 from syncrelay.status.server import PATHS_TOLD, Server
@@ -32,6 +32,10 @@ REFUSED = replace(
             for each in working().facts.inputs
         ),
     ),
+)
+UNBUNDLED = replace(
+    working(),
+    facts=replace(working().facts, unbundled=Unbundled(Refusal("publish", "/set", "a/msg/B"), is_alone=False)),
 )
 UNFIT = Endpoint("/usb_cam", CAMERA.type, Mismatch("reliability", "best_effort", "reliable"))
 
@@ -96,10 +100,11 @@ def test_a_relay_lives_while_its_receive_loop_turns(state, answer):
         (relay(started(camera=(Endpoint("/x", "std_msgs/msg/Int64"),))), (503, "not ready: running, see /status\n")),
         (relay(STOPPED), (503, "not ready: running, see /status\n")),
         (relay(REFUSED), (503, "not ready: running, see /status\n")),
+        (relay(UNBUNDLED), (503, "not ready: running, see /status\n")),
     ],
     ids=[
         *("ready", "drains", "starts", "no group", "no publisher", "QoS does not fit", "one of two fits", "other type"),
-        *("a bug stopped it", "refused by DDS"),
+        *("a bug stopped it", "refused by DDS", "no bundle"),
     ],
 )
 def test_a_relay_is_ready_while_every_required_input_is_served(state, answer):
