@@ -112,6 +112,8 @@ class GroupConfig:
     def enough(self, numbers: Sequence[float]) -> tuple[int, ...]:
         """Return the required inputs, and with a `quorum` as many of the others: those with the greatest numbers."""
         required = self.required
+        if (self.options.quorum or 0) <= len(required):
+            return required
         others = sorted(
             (index for index in range(len(self.topics)) if index not in required), key=lambda i: -numbers[i]
         )

@@ -39,14 +39,16 @@ class Backlog:
         A message that came after the poll is held: a source that had none at the poll may have an older one by now.
         A message that was held before is due even if the clock was set back since: all sources have been polled again.
         """
-        due = max([until, *(head[0] for head in self._heads)])
+        heads, due = self._heads, until
+        for head in heads:
+            due = max(due, head[0])
         for source in sources:
             if source not in self.held:
                 self._take(source)
         for _ in range(_BATCH):
-            if not self._heads or self._heads[0][0] > due:
+            if not heads or heads[0][0] > due:
                 return
-            self._take(self._hand_on(heappop(self._heads), until))
+            self._take(self._hand_on(heappop(heads), until))
 
     def deliver_until(self, until: int, sources: Iterable[Source]) -> None:
         """Deliver what these sources received up to a time, in nanoseconds of the system clock, however much it is."""
@@ -93,11 +95,8 @@ class Backlog:
             self.failed[source] = error
             return
         if payload is not None:
-            self._hold(source, payload)
-
-    def _hold(self, source: Source, payload: Payload) -> None:
-        self.held.add(source)
-        heappush(self._heads, (payload.received, next(self._ties), payload, source))
+            self.held.add(source)
+            heappush(self._heads, (payload.received, next(self._ties), payload, source))
 
 
 class PolledInbox:

@@ -57,11 +57,12 @@ class Rule(NamedTuple):
     code: Code
     find: Callable[[GroupFacts], Iterable[Fault]]
 
-    def findings(self, facts: GroupFacts) -> Iterator[Finding]:
-        """Yield what it finds."""
-        for fault in self.find(facts):
-            text, suggestion, severity, about, explains, inputs = fault
-            yield Finding(self.code, severity, text, suggestion, about, explains, inputs)
+    def findings(self, facts: GroupFacts) -> list[Finding]:
+        """Return what it finds."""
+        return [
+            Finding(self.code, severity, text, suggestion, about, explains, inputs)
+            for text, suggestion, severity, about, explains, inputs in self.find(facts)
+        ]
 
 
 def of_each_input(code: Code, rule: Callable[[GroupFacts, int, InputFacts], Found]) -> Rule:

@@ -165,7 +165,7 @@ class Groups:
         chosen = _chosen(config, self._names)
         changed = exchange([group.config for group in running.values()], chosen, stopped=stopped)
         self._exchange([running[each.name] if each.name in changed.kept else self._begun(each) for each in chosen])
-        limited = self._limited
+        limited = [(group, group.config.ticks is not None) for group in self._limited]
         # This is called at every turn. With simulated time nothing is: its ticks call `expire` instead.
         asks = bool(limited) and not self._clock.is_simulated
         self._loop.deadline = (lambda: self._next_deadline(limited)) if asks else None
@@ -252,19 +252,23 @@ class Groups:
             if group.config.options.transforms is not None:
                 group.expire(now if group.config.ticks is None else self._clock.stamping())
 
-    def _next_deadline(self, groups: Sequence[GroupRelay]) -> int | None:
-        """Return when the first of these wants `expire` to be called, by the clock that messages wait by."""
-        try:
-            deadlines = [group.engine.next_deadline() for group in groups]
-        except Exception:  # noqa: BLE001  one call more for each group would be paid at every turn
-            deadlines = [group.next_deadline() for group in groups]
+    def _next_deadline(self, groups: Sequence[tuple[GroupRelay, bool]]) -> int | None:
+        """Return when the first of these wants `expire` to be called, by the clock that messages wait by.
+
+        Beside each group stands whether a clock makes its sets.
+        """
         first = None
-        for group, deadline in zip(groups, deadlines, strict=True):
+        for group, by_clock in groups:
+            try:
+                deadline = group.flow.engine.next_deadline()
+            except Exception:  # noqa: BLE001  one call more for each group would be paid at every turn
+                deadline = group.next_deadline()
             if deadline is None:
                 continue
-            if group.config.ticks is not None:
-                deadline += self._clock.now() - self._clock.stamping()  # noqa: PLW2901
-            first = deadline if first is None else min(first, deadline)
+            if by_clock:
+                deadline += self._clock.now() - self._clock.stamping()
+            if first is None or deadline < first:
+                first = deadline
         return first
 
     def flush(self, reason: DropReason) -> None:

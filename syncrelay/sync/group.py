@@ -148,9 +148,10 @@ class SyncGroup(Generic[T]):
     def next_deadline(self) -> int | None:
         """Return the `now` at which `expire` has something to do; None if not before the next message."""
         deadline = self._matching.next_deadline()
-        if self._stage is None:
-            return deadline
-        return min((each for each in (deadline, self._stage.next_deadline()) if each is not None), default=None)
+        staged = None if self._stage is None else self._stage.next_deadline()
+        if deadline is None or (staged is not None and staged < deadline):
+            return staged
+        return deadline
 
     def expire(self, *, now: int) -> Sequence[Outcome[T]]:
         """Return what leaves because it has waited long enough, or because more transforms are known."""

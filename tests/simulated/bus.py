@@ -228,22 +228,25 @@ class Link:
 
     def send(self, sample: Sample) -> None:
         """Send a message on its way."""
-        if self.reader.is_sink or not self._may_pass(sample):
+        if self.reader.is_sink:
+            return
+        if (self.empty is not None or not sample.content) and not self._may_pass(sample):
             return
         bus = self.writer.bus
         self.under_way += 1
         if not self.is_receiving or self.reader.participant.process.is_still:
             self.waiting.append(sample)
             return
-        when = bus.scheduler.now + int(bus.weather.latency * bus.random() ** 2)
-        resent = bool(bus.weather.loss) and bus.random() < bus.weather.loss
+        scheduler, weather = bus.scheduler, bus.weather
+        when = scheduler.now + int(weather.latency * bus.random() ** 2)
+        resent = weather.loss > 0 and bus.random() < weather.loss
         if resent:
             if not self.is_reliable:
                 self._lose(sample)
                 return
             when += int(_HEARTBEAT * bus.random() ** 4) + MS
         self.last = when = max(when, self.last)
-        bus.scheduler.at(when, lambda: self._arrive(sample, resent=resent))
+        scheduler.at(when, partial(self._arrive, sample, resent=resent))
 
     def _may_pass(self, sample: Sample) -> bool:
         if self.empty is not None and not self.writer.holds(self.empty):

@@ -352,6 +352,7 @@ class SimulatedSource:
         self.subscription = subscription
         self.deliver = deliver
         self.waited = self.pending = 0
+        self.queue = subscription.reader.queue
         self._take = subscription.reader.take
         self._tally = Tally()
         self.deliveries = self._tally.read
@@ -423,10 +424,13 @@ class SimulatedWatch:
         return ready, seen_until, woken
 
     def _ready(self) -> list[Any]:
-        # As rclpy's executor: it cannot wait on what has been destroyed.
-        if any(each.subscription.is_destroyed for each in self._sources):
-            raise RclError("Cannot use Destroyable because destruction was requested")
-        ready = [each for each in self._sources if each.subscription.reader.queue]
+        ready = []
+        for each in self._sources:
+            if each.subscription.is_destroyed:
+                # As rclpy's executor: it cannot wait on what has been destroyed.
+                raise RclError("Cannot use Destroyable because destruction was requested")
+            if each.queue:
+                ready.append(each)
         for each in ready:
             each.pending = ALL
         return ready

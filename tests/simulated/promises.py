@@ -5,6 +5,7 @@ import re
 from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -97,6 +98,15 @@ class Set(NamedTuple):
     numbers: tuple[int | None, ...]
 
 
+@dataclass(slots=True)
+class _Open:
+    """A set whose messages leave now, in the order of the inputs: the last so far is of input `last`."""
+
+    at: float
+    numbers: list[int | None]
+    last: int = -1
+
+
 class _Moment(NamedTuple):
     """A moment that could make a set: its first message, when the last was sent, and when the set left if it did."""
 
@@ -123,9 +133,11 @@ class Promises:
         self.world = world
         self.broken: list[str] = []
         self._groups = {each.name: each for each in world.plan.groups}
+        self._sensors = {each.topic: each for each in world.plan.sensors}
+        self._spoilt = {each.name: self._spoilt_of(each) for each in world.plan.groups}
         self.sets: dict[str, list[Set]] = defaultdict(list)
         self.seen: dict[str, list[Seen]] = defaultdict(list)
-        self._open: dict[str, tuple[float, dict[int, int]]] = {}
+        self._open: dict[str, _Open] = {}
         self._written: dict[str, dict[int, float]] = defaultdict(dict)
         self._reports: dict[str, GroupReport] = {}
         self._judged: dict[str, float] = {}
@@ -153,25 +165,25 @@ class Promises:
         if place is None or relay is None or writer.participant.process is not relay.process:
             return
         group, index = place
-        still = self.world.still_since
-        if still is not None and still < self.world.now:
-            self.broken.append(
-                f"{self.world.now:.2f} s: {group}: a set left, though nothing was to since {still:.2f} s"
-            )
+        now, still = self.world.now, self.world.still_since
+        if still is not None and still < now:
+            self.broken.append(f"{now:.2f} s: {group}: a set left, though nothing was to since {still:.2f} s")
             self.world.still_since = None
-        at, inputs = self._open.get(group, (0.0, {}))
-        if inputs and (index <= max(inputs) or at != self.world.now):
+        topics = self._groups[group].topics
+        opened = self._open.get(group)
+        if opened is not None and (opened.at != now or index <= opened.last):
             self._close(group)
-            inputs = {}
+            opened = None
+        if opened is None:
+            opened = self._open[group] = _Open(now, [None] * len(topics))
         sensor, number = identity(sample.content)
-        if self.world.plan.sensors[sensor].topic != self._group(group).topics[index]:
-            self.broken.append(f"{self.world.now:.2f} s: {writer.topic} carries a message of another topic")
-        self._open[group] = self.world.now, {**inputs, index: number}
+        if self.world.plan.sensors[sensor].topic != topics[index]:
+            self.broken.append(f"{now:.2f} s: {writer.topic} carries a message of another topic")
+        opened.numbers[index], opened.last = number, index
 
     def _close(self, group: str) -> None:
-        at, inputs = self._open.pop(group)
-        numbers = tuple(inputs.get(index) for index in range(len(self._group(group).topics)))
-        self.sets[group].append(Set(at, numbers))
+        opened = self._open.pop(group)
+        self.sets[group].append(Set(opened.at, tuple(opened.numbers)))
 
     def _group(self, name: str) -> Group:
         return self._groups[name]
@@ -237,7 +249,7 @@ class Promises:
         """Look whether somebody is called silent who has more time to send."""
         for found in filter(None, map(_SILENT_FOR.search, texts)):
             topic, seconds = (each for each in found.groups() if each is not None)
-            if float(seconds) < 1.5 / (self.world.plan.hz * self.world.plan.sensor(topic).every):
+            if float(seconds) < 1.5 / (self.world.plan.hz * self._sensors[topic].every):
                 self.broken.append(f"{self.world.now:.2f} s: {name}: {found[0]}, which is as usual")
 
     def _look_for_miscounted(self, name: str, shown: "InputGraph") -> None:
@@ -315,10 +327,9 @@ class Promises:
     def _wrong_sets(self, group: Group) -> Iterator[str]:
         plan = self.world.plan
         used: dict[tuple[int, int], float] = {}
+        odd = [step for step in plan.steps if step.kind in _ODD]
         for one in self.sets[group.name]:
-            if any(
-                step.kind in _ODD and step.at - 1 <= one.at <= step.at + step.seconds + _AGAIN_S for step in plan.steps
-            ):
+            if any(step.at - 1 <= one.at <= step.at + step.seconds + _AGAIN_S for step in odd):
                 continue
             where = f"{one.at:.2f} s: {group.name}: the set {one.numbers}"
             rows = list(zip(group.topics, one.numbers, strict=True))
@@ -362,9 +373,9 @@ class Promises:
         return any(step.kind == "twice" or (kept and step.kind in _SUBSCRIBES_AGAIN) for step in steps)
 
     def _is_kept(self, group: Group) -> bool:
-        return any(self.world.plan.sensor(topic).durability == "transient_local" for topic in group.topics)
+        return any(self._sensors[topic].durability == "transient_local" for topic in group.topics)
 
-    def _spoilt(self, group: Group) -> list[tuple[float, float]]:
+    def _spoilt_of(self, group: Group) -> list[tuple[float, float]]:
         """Return the times in which sets of a group may be missing."""
         plan = self.world.plan
         spoiling = [step for step in plan.steps if KINDS[step.kind].spoils and concerns(step.kind, step.target, group)]
@@ -380,22 +391,21 @@ class Promises:
         return [(0.0, SETTLED_S), *times]
 
     def _is_calm(self, group: Group, at: float) -> bool:
-        return not any(begin <= at <= end for begin, end in self._spoilt(group))
+        return not any(begin <= at <= end for begin, end in self._spoilt[group.name])
 
     def _moments(self, group: Group) -> Iterator[_Moment]:
         """Yield the moments of which all required inputs were sent, by the number of the first of them."""
         if group.quorum:
             yield from self._moments_of_any(group)
             return
-        plan = self.world.plan
         triggers = group.topics[:1] if group.repeats else group.required
         anchor = triggers[0]
         sets = {each.numbers[group.topics.index(anchor)]: each.at for each in self.sets[group.name]}
-        of = plan.sensor(anchor).every
+        of = self._sensors[anchor].every
         for number, at in self._written[anchor].items():
             if number % of and not group.repeats:
                 continue
-            others = [self._written[topic].get(number // of * plan.sensor(topic).every) for topic in triggers]
+            others = [self._written[topic].get(number // of * self._sensors[topic].every) for topic in triggers]
             came = [each for each in others if each is not None]
             if len(came) == len(others):
                 yield _Moment(anchor, number, at, max(came), sets.get(number))
@@ -415,7 +425,7 @@ class Promises:
         end = min(plan.length, self.world.now) - _LATE_S - 2 / plan.hz - 1
         slack = _LATE_S + 2 / plan.hz + (0.3 if group.optional else 0)
         for anchor, number, at, came, left in () if group.by_clock else self._moments(group):
-            if at > end or not self._is_calm(group, at - plan.sensor(anchor).takes / SECOND):
+            if at > end or not self._is_calm(group, at - self._sensors[anchor].takes / SECOND):
                 continue
             if left is None:
                 yield f"{at:.2f} s: {group.name}: no set of message {number} of {anchor}"

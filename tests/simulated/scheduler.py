@@ -234,22 +234,26 @@ class Scheduler:
 
     def _next(self) -> Task:
         """Take the task that runs next, after as much time as it takes."""
-        ready = self._ready
+        ready, now = self._ready, self.now
         self._turns += 1
         if self._turns > _MOST_TURNS:
             self._fail(StuckError(f"{_MOST_TURNS} turns at one instant, now of {self.current.name}\n{self.describe()}"))
         while True:
             if not ready:
                 self._advance()
+                now = self.now
                 continue
-            # random() is ten times as fast as randrange().
-            index = int(self._random() * len(ready)) if len(ready) > 1 else 0
-            task = ready[index]
-            ready[index] = ready[-1]
-            ready.pop()
-            if not task.process.is_still:
+            if len(ready) == 1:
+                task = ready.pop()
+            else:
+                # random() is ten times as fast as randrange().
+                index = int(self._random() * len(ready))
+                task, ready[index] = ready[index], ready[-1]
+                ready.pop()
+            process = task.process
+            if not process.is_dead and process.stalled_until <= now:
                 return task
-            task.process.held.append(task)
+            process.held.append(task)
 
     def _advance(self) -> None:
         """Go to the time of the next timer, and do all that is due then."""

@@ -182,14 +182,16 @@ class Broadcaster:
         edges = [("base", f"s{index}", 0) for index in range(len(self.world.plan.sensors))]
         static.write(transforms("/tf_static", *edges).payload)
         self.writer = node.writer("/tf", TF, Profile(depth=100))
+        # Serialized once: the stamp stands behind the encapsulation and the number of transforms.
+        self._message = transforms("/tf", ("odom", "base", 1)).payload
         self._publish()
 
     def _publish(self) -> None:
         scheduler = self.world.scheduler
         scheduler.after(50 * MS, self._publish)
         if not self.is_silent:
-            stamp = self.world.stamp_at(scheduler.now - 10 * MS)
-            self.writer.write(transforms("/tf", ("odom", "base", max(1, stamp))).payload)
+            stamp = max(1, self.world.stamp_at(scheduler.now - 10 * MS))
+            self.writer.write(self._message[:8] + struct.pack("<iI", *divmod(stamp, SECOND)) + self._message[16:])
 
 
 class Witness:
@@ -313,6 +315,9 @@ class World:
         return when > self._span_of(when).until
 
     def _span_of(self, when: int) -> _Span:
+        last = self._rig_clock[-1]
+        if last.since <= when:
+            return last
         return next(each for each in reversed(self._rig_clock) if each.since <= when)
 
     def shift_rig_clock(self, by: int) -> None:
