@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from random import Random
 
 OTHER_TYPE: Final = "geometry_msgs/msg/PointStamped"
-_TICK: Final = 50 * MS
+_TICK: Final = 100 * MS
 _FILES: Final = "syncrelay-files"
 # Calls after which a relay that is paused or inactive is so still.
 _SENDS_NOTHING_NEW: Final = frozenset({"status", "reload", "pause", "deactivate"})
@@ -143,8 +143,7 @@ class Driver:
         if self.sensor.wobble:
             stamp += int(self.sensor.wobble * self.random.random())
         stamp = 0 if self.is_zero else max(0, stamp + self.shift)
-        frame = f"s{self.index}" if self.world.plan.transforms else f"{number}/{self.sensor.every}"
-        data = content(stamp, frame, self.index, number)
+        data = content(stamp, self._frame(f"{number}/{self.sensor.every}"), self.index, number)
         if self.is_cut:
             data = data[:6]
         if self.dies_in_write:
@@ -164,11 +163,15 @@ class Driver:
     def _write_between(self, stamp: int, life: int) -> None:
         """Write a message of no moment of the rig."""
         if self.writer is not None and life == self._life:
-            self.writer.write(content(stamp + self.period // 2, "between", self.index, -1))
+            self.writer.write(content(stamp + self.period // 2, self._frame("between"), self.index, -1))
+
+    def _frame(self, key: str) -> str:
+        """Return the frame of a message: where sets wait for transforms, the sensor's; else what it is matched by."""
+        return f"s{self.index}" if self.world.plan.transforms else key
 
 
 class Broadcaster:
-    """Somebody who publishes transforms: where the sensors are on the robot, and at 20 Hz where that is."""
+    """Somebody who publishes transforms: where the sensors are on the robot, and at 5 Hz where that is."""
 
     def __init__(self, world: "World") -> None:
         self.world = world
@@ -188,7 +191,7 @@ class Broadcaster:
 
     def _publish(self) -> None:
         scheduler = self.world.scheduler
-        scheduler.after(50 * MS, self._publish)
+        scheduler.after(200 * MS, self._publish)
         if not self.is_silent:
             stamp = max(1, self.world.stamp_at(scheduler.now - 10 * MS))
             self.writer.write(self._message[:8] + struct.pack("<iI", *divmod(stamp, SECOND)) + self._message[16:])
