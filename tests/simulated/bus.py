@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
+from operator import attrgetter
 from typing import Any, Final, NamedTuple
 
 from syncrelay.config.profile import Profile, mismatch
@@ -262,7 +263,8 @@ class Link:
         return False
 
     def _send_waiting(self) -> None:
-        waiting, self.waiting = self.waiting, []
+        # What is resent reaches a process that stands still after what was sent later: DDS hands on in order.
+        waiting, self.waiting = sorted(self.waiting, key=attrgetter("number")), []
         bus = self.writer.bus
         for number, sample in enumerate(waiting):
             if self.is_reliable and self.writer.holds(sample):
