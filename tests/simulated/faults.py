@@ -239,7 +239,8 @@ def second_publisher(world: World, target: str, _: float) -> End:
     return driver.leave
 
 
-@_kind(names="messages_lost slowed silent bursts short_queue clock_drift")
+# Transforms are messages, too: what is lost of them is sent again, later than sets wait.
+@_kind(names="messages_lost slowed silent bursts short_queue clock_drift no_transform")
 def loss(world: World, _: str, __: float) -> End:
     """The network loses a third of all messages."""
     weather = world.bus.weather
