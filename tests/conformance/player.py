@@ -79,6 +79,8 @@ class Player:
         self._begin = world.runtime.time_ns()
         self._writers: dict[str, tuple[Writer, str]] = {}
         self._readers: dict[str, Reader] = {}
+        self._topics: dict[str, str] = {}
+        self._held: dict[str, object] = {}
         self._running: _Running | None = None
         self.seen = Seen()
 
@@ -109,6 +111,7 @@ class Player:
         """Somebody subscribes, with a history of 1000 unless told otherwise."""
         profile = Profile(**{"depth": 1000, **qos})
         self._readers[name or topic] = self._world.reader(topic, of, profile, by=by, node=node or by)
+        self._topics[name or topic] = topic
         self.seen.outputs[name or topic] = []
 
     def relay(
@@ -304,7 +307,11 @@ class Player:
 
     def hold(self, topic: str, of: str) -> None:
         """A part of the relay's process that is not ours publishes on a topic."""
-        self._world.hold(self._relay.node, topic, of)
+        self._held[topic] = self._world.hold(self._relay.node, topic, of)
+
+    def free(self, topic: str) -> None:
+        """It publishes there no more."""
+        self._world.free(self._relay.node, self._held.pop(topic))
 
     def finding(self, code: str, name: str = "front", *, naming: str = "", wordless: bool = False) -> None:
         """What explains most of a group's state is this, and names somebody; its words are noted."""
@@ -427,7 +434,8 @@ class Player:
     def stop(self) -> None:
         """The relay gets SIGTERM, and ends."""
         self._reports()
-        self.seen.inside.append(short_of(status_of(self._relay.state()).as_dict()))
+        state = self._relay.state()
+        self.seen.inside.append(f"{short_of(status_of(state).as_dict())} turned {state.turned_s:.1f} s ago")
         running, self._running = self._require, None
         running.end()
         self._until(lambda: running.has_ended, "the end of the relay")
@@ -499,8 +507,8 @@ class Player:
         topics = self._relay._groups.bindings.topics  # noqa: SLF001
         found = [output for topic in topics for output in topic.outputs.all]
         outputs = {node.resolve_topic(each.topic): each.publisher or each.bundle.publisher for each in found}
-        publisher = outputs.get(name)
-        return name not in outputs or (publisher is not None and publisher.is_heard())
+        publisher = outputs.get(self._topics[name])
+        return self._topics[name] not in outputs or (publisher is not None and publisher.is_heard())
 
     def _taken(self, name: str) -> int:
         reader, texts = self._readers[name], self.seen.outputs[name]

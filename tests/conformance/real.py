@@ -12,6 +12,7 @@ from unittest.mock import patch
 import rclpy
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.event_handler import PublisherEventCallbacks
 
 from syncrelay.config.profile import Profile
 from syncrelay.relay.ports import Node, Purpose
@@ -101,7 +102,6 @@ class RealWorld:
         self.graph = RosGraph(self._caller.node)
         self._stage = Stage(folder, domain, BACKEND)
         self._mortals: dict[str, list[Player]] = {}
-        self._held: list[Any] = []
 
     def writer(self, topic: str, type_name: str, profile: Profile, *, by: str, node: str) -> Any:
         if by.startswith(_MORTAL):
@@ -151,8 +151,13 @@ class RealWorld:
         ros_args = [word for old, new in names.items() for word in ("-r", f"{old}:={new}")]
         return joined(config, ros_args=ros_args, purpose=purpose, is_managed=config.node.lifecycle)
 
-    def hold(self, node: Any, topic: str, type_name: str) -> None:
-        self._held.append(node.raw.create_publisher(import_type(type_name), topic, 1))
+    def hold(self, node: Any, topic: str, type_name: str) -> object:
+        # One that tells of events is in the executor, and may not end while that waits.
+        silent = PublisherEventCallbacks(use_default_callbacks=False)
+        return node.raw.create_publisher(import_type(type_name), topic, 1, event_callbacks=silent)
+
+    def free(self, node: Any, held: object) -> None:
+        node.raw.destroy_publisher(held)
 
     def wait_until(self, condition: Callable[[], object], what: str) -> None:
         wait_until(condition, what, deadline_s=60, poll_s=0.01)
@@ -173,7 +178,6 @@ class RealWorld:
         self._nodes.clear()
         for by in list(self._mortals):
             self.leave(by)
-        self._held.clear()
         wait_until(lambda: len(self.graph.nodes()) == 1, "the others to go")
 
     def close(self) -> None:

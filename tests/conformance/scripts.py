@@ -15,6 +15,8 @@ from tests.conformance.script import (
     REFERENCE,
     STRING,
     TF,
+    VECTOR,
+    Script,
     Step,
     do,
     group,
@@ -280,9 +282,9 @@ _GRAPH: Final = (
         do.write("/a", 70), do.endpoints("/front/a", publishers=0),
         do.endpoints("/syncrelay/front/sets", publishers=0), do.endpoints("/diagnostics", publishers=0), do.observed()),
     long("who observes looks longer where sets have just stopped",
-        _SENSORS, do.observe(PAIR, 3), do.served("/a", 1), do.served("/b", 1), do.sleep(0.5),
-        *(step for stamp in range(10, 60, 10)
-            for step in (do.write("/a", stamp), do.write("/b", stamp), do.sleep(0.1))), do.observed(),
+        _SENSORS, do.observe(PAIR, 5), do.served("/a", 1), do.served("/b", 1), do.sleep(0.5),
+        *(step for stamp in range(500, 3000, 500)
+            for step in (do.write("/a", stamp), do.write("/b", stamp), do.sleep(0.5))), do.observed(),
         blind=("notes",)),
     long("a name that nobody publishes, and the only topic of its type",
         do.publisher("/x", of=POINT), do.publisher("/b"), do.relay(_front({"topic": "/lidar", "type": POINT}, "/b")),
@@ -398,6 +400,15 @@ _LIFE: Final = (
     short("nothing leaves while the relay is paused",
         _RIG, do.sets(10), do.feed("/a", 20), do.call("pause"), do.call("pause"), do.finding("paused"), do.sets(30),
         do.counts(), do.call("resume"), do.call("resume"), do.sets(40), _out(2), do.counts()),
+    long("a reload while nothing leaves brings groups of which nothing leaves",
+        _RIG, do.publisher("/c"), do.call("pause"), do.file({**_front(queue_size=7), "rear": group("/b", "/c")}),
+        do.call("reload"), do.subscriber("/rear/b"), do.ready(), do.sets(10, of=("/a", "/b", "/c")), do.counts(),
+        do.counts("rear"), do.call("resume"), do.sets(20, of=("/a", "/b", "/c")), _out(1), do.out("/rear/b", 1),
+        do.counts(), do.counts("rear")),
+    long("a group that recovers while others do not is told of at the end",
+        _THREE, do.publisher("/d"), do.relay({"one": group("/a", "/b"), "two": group("/c", "/d")}), do.ready(),
+        do.sets(10, of=("/a", "/b", "/c", "/d")), do.sleep(12),
+        *((do.sets(stamp), do.sleep(1)) for stamp in range(14_000, 34_000, 1000)), do.stop()),
     long("the relay says in words how it stands",
         _RIG, do.sets(10, 20, 30), _out(3), do.finding("healthy"), do.call("status")),
     short("a lazy group sleeps until somebody subscribes",
@@ -469,8 +480,8 @@ _LIFE: Final = (
         do.file(PAIR, node={"name": "other"}), do.transit("configure"), do.file(PAIR),
         do.transit("configure", "activate"), _EARS, do.ready(), do.sets(10), _out(1)),
     long("a managed node that is shut down stays so",
-        _SENSORS, do.relay(PAIR, node=_MANAGED), do.transit("configure", "activate"), do.ready(),
-        do.transit("shutdown", "configure", "shutdown"), do.phase("finalized"),
+        _SENSORS, do.relay(PAIR, node=_MANAGED), do.call("reload"), do.transit("configure", "activate"), do.ready(),
+        do.transit("shutdown", "configure", "shutdown"), do.phase("finalized"), do.call("reload"), do.call("status"),
         do.endpoints("/a", publishers=1, subscribers=0)),
     short("what is buffered at the end is dropped as that",
         _RIG, do.sets(10), do.feed("/a", 20, 30), _out(1), do.stop(),
@@ -529,9 +540,9 @@ _TRANSFORMS: Final = (
 _BUNDLED: Final = group({"topic": "/a", "type": IMAGE, "stamp": "receive"},
     {"topic": "/b", "type": COLOR, "stamp": "receive"}, policy="approximate_time_eager", slop="50s", outputs=False,
     bundle={"topic": "/set", "type": MARKER})
-_BUNDLE_SET: Final = (
-    do.feed("/a", 0, data=b"\0\1\0\0" + bytes(8) + b"\1\0\0\0\0\0\0\0" * 2 + bytes(4)),
-    do.feed("/b", 0, data=b"\0\1\0\0" + bytes(16)))
+_IMAGE: Final = b"\0\1\0\0" + bytes(8) + b"\1\0\0\0\0\0\0\0" * 2 + bytes(4)
+_COLOR: Final = b"\0\1\0\0" + bytes(16)
+_BUNDLE_SET: Final = (do.feed("/a", 0, data=_IMAGE), do.feed("/b", 0, data=_COLOR))
 _BUNDLES: Final = (
     long("sets leave in bundles, by the publisher that fits their inputs and the file",
         do.publisher("/a", of=IMAGE), do.publisher("/b", of=COLOR), do.relay({"front": _BUNDLED}),
@@ -554,6 +565,59 @@ _BUNDLES: Final = (
         do.endpoints("/set", publishers=0), do.endpoints("/tf", publishers=1, subscribers=0)),
 )
 
+_POINTS: Final = {"topic": "/p", "type": POINT, "output": "/y"}
+_TAKES_X: Final = {**_POINTS, "output": "/x"}
+_VECTORS_TO_X: Final = {"front": group(row("/a", output="/x"), "/b"), "rear": group(_POINTS, "/b")}
+_POINTS_TO_X: Final = {"front": group(_TAKES_X, "/b"), "rear": group(_POINTS, "/b")}
+_X: Final = (
+    *_SENSORS, do.publisher("/p", of=POINT), do.relay(_VECTORS_TO_X), do.subscriber("/x"), do.subscriber("/front/b"),
+    do.ready(), do.sets(10), do.feed("/a", 15))
+
+
+def _refused(
+    what: str, topic: str, groups: dict[str, Any], *before: Step, types: tuple[str, str] = (VECTOR, VECTOR),
+    blind: tuple[str, ...] = (), **sections: Any,
+) -> Script:
+    """A reload asks for something on a topic that the relay's own process holds with another type, until it is free."""
+    a, b = types
+    rear = group({"topic": "/a", "type": a, "stamp": "receive"}, row("/c"), policy="approximate_time_eager", slop="1s")
+    sets = [(do.write("/a", at, data=_IMAGE), do.write("/b", at, data=_COLOR)) if a == IMAGE else
+        (do.write("/a", at), do.write("/b", at)) for at in (10, 20)]
+    return long(f"{what} that DDS refuses is asked for again",
+        do.publisher("/a", of=a), do.publisher("/b", of=b), do.publisher("/c"), before,
+        do.relay({"rear": {**rear, "manifest": False}}, diagnostics=None), do.ready("/a", "/c"), do.hold(topic, POINT),
+        do.file(groups, **sections), do.call("reload"), do.sleep(6), sets[0], do.sleep(1), do.call("status"),
+        do.free(topic), do.sleep(7), do.call("reload"), do.sleep(4), sets[1], do.sleep(3), do.call("status"),
+        blind=blind)
+
+
+_REFUSALS: Final = (
+    _refused("an output of an input that is received", "/front/a", _front(manifest=False), diagnostics=None,
+        # Whether the group that stays is said to be silent before it ends.
+        blind=("log",)),
+    _refused("an output of an input that is not yet received", "/front/b", _front(manifest=False), diagnostics=None),
+    _refused("a subscription", "/b", _front(manifest=False), diagnostics=None),
+    _refused("a manifest", "/syncrelay/front/sets", _front(), diagnostics=None),
+    _refused("the publisher of diagnostics", "/diagnostics", _front()),
+    _refused("a figure for plotting", "/syncrelay/front/span_ms", _front(), diagnostics={"scalars": True}),
+    _refused("a bundle", "/set", {"front": _BUNDLED}, types=(IMAGE, COLOR)),
+    _refused("the topic of transforms", "/tf", _front(transforms={"target": "odom", "wait": "50ms"}),
+        do.publisher("/tf_static", of=TF)),
+    long("a reload gives an output's name to the messages of another type that come already",
+        _X, do.file(_POINTS_TO_X), do.call("reload"), do.end("/x"), do.subscriber("/x", of=POINT, name="points"),
+        do.ready("points"), do.feed("/p", 20), do.feed("/b", 20), do.out("points", 1), do.counts(),
+        do.endpoints("/x", publishers=1)),
+    long("a reload that fails when an output has ended for it goes back to what ran before",
+        _X, do.hold("/x", VECTOR), do.file(_POINTS_TO_X), do.call("reload"), do.counts(), do.feed("/b", 15),
+        do.sets(20), do.out("/x", 3), do.free("/x"), do.call("reload"), do.endpoints("/x", publishers=1)),
+    long("a reload makes an output of what was an input",
+        do.publisher("/b"), do.publisher("/p", of=POINT), do.publisher("/x"),
+        do.relay({"front": group("/x", "/b"), "rear": group(_POINTS, "/b")}), do.ready(), do.sets(10, of=("/x", "/b")),
+        do.end("/x"), do.endpoints("/x", publishers=0), do.file(_POINTS_TO_X), do.call("reload"),
+        do.subscriber("/x", of=POINT, name="points"), do.ready("points"), do.feed("/p", 20), do.feed("/b", 20),
+        do.out("points", 1), do.counts()),
+)
+
 # fmt: on
 SCRIPTS: Final = (
     *_QOS,
@@ -566,4 +630,5 @@ SCRIPTS: Final = (
     *_LIFE,
     *_TRANSFORMS,
     *_BUNDLES,
+    *_REFUSALS,
 )

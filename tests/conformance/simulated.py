@@ -90,8 +90,11 @@ class SimulatedWorld:
         )
         return node, SimulatedBackend(self.runtime)
 
-    def hold(self, node: Any, topic: str, type_name: str) -> None:
-        node.publisher(import_type(type_name), topic, Profile(depth=1))
+    def hold(self, node: Any, topic: str, type_name: str) -> object:
+        return node.publisher(import_type(type_name), topic, Profile(depth=1))
+
+    def free(self, node: Any, held: object) -> None:
+        node.end(held)
 
     def wait_until(self, condition: Callable[[], object], what: str) -> None:
         end, rest = self.scheduler.now + 60 * SECOND, 0.02

@@ -1,5 +1,9 @@
 """A bug in a part of the relay or in a package, on the simulated ROS: others go on, and whoever asks is told."""
 
+import json
+from collections.abc import Callable
+from concurrent.futures import Future
+from functools import partial
 from itertools import count
 
 import pytest
@@ -8,10 +12,11 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from sensor_msgs.msg import TimeReference
 
-from syncrelay.config import GroupConfig
+from syncrelay.config import GroupConfig, load_text
 from syncrelay.dataflow.receive import ReceiveLoop
+from syncrelay.errors import ReloadError
 from syncrelay.relay.groups import Groups
-from syncrelay.relay.ports import RclError
+from syncrelay.relay.ports import Answer, RclError
 from syncrelay.relay.relay import Relay
 from syncrelay.sync.group import SyncGroup
 from tests.conformance.player import play
@@ -112,6 +117,44 @@ def test_one_that_ends_the_main_or_the_receive_thread_ends_the_relay_with_all_ot
         assert not [each for each in world.runtime.alive() if each.startswith("syncrelay-") and "files" not in each]
 
 
+def test_what_fails_and_what_never_ends_is_answered_and_more_calls_than_can_wait_are_refused():
+    def broken() -> Future[str]:
+        raise ZeroDivisionError("x")
+
+    def told(of: Callable[[Future[str]], object]) -> Callable[[], Future[str]]:
+        future: Future[str] = Future()
+        of(future)
+        return lambda: future
+
+    offered: dict[str, Callable[[], Future[str]]] = {
+        "broken": broken,
+        "hostile": told(lambda future: future.set_result("one\x1b[2J\ntwo\udc80")),
+        "wrong": told(lambda future: future.set_exception(ReloadError("no\nfile"))),
+        "cancelled": told(Future.cancel),
+        **{f"never {n}": Future for n in range(11)},
+    }
+    answers: dict[str, Answer] = {}
+    with SimulatedWorld(1) as world:
+        config = load_text(json.dumps({"version": 1, "groups": PAIR}))
+        node, backend = world.join(config, {})
+        with Relay(config, node, backend, runtime=world.runtime) as relay:
+            relay.offer(offered)
+            for name in offered:
+                node.request(name, partial(answers.__setitem__, name))
+            world.scheduler.sleep(1)
+            assert [*answers] == ["broken", "hostile", "wrong", "cancelled", "never 10"]
+            relay.drain()
+            world.scheduler.sleep(1)
+    why = answers["broken"].message
+    assert why == "a bug in syncrelay while answering ~/broken: ZeroDivisionError('x'); its traceback is in the log"
+    assert answers["hostile"] == Answer(success=True, message="one\\x1b[2J\n  two\\udc80")
+    assert answers["wrong"] == Answer(success=False, message="no\n  file")
+    too_many = "10 calls are already waiting for their answers; call again later"
+    assert answers["never 10"] == Answer(success=False, message=too_many)
+    ending = [answers[name] for name in ("cancelled", *(f"never {n}" for n in range(10)))]
+    assert {*ending} == {Answer(success=False, message="the relay is ending")}
+
+
 def test_what_dds_refuses_is_asked_for_again_though_the_graph_does_not_change(monkeypatch, tmp_path):
     sound, refused = SimulatedNode.publisher, count()
 
@@ -141,11 +184,11 @@ def test_one_in_the_library_of_a_type_is_told_as_what_its_topic_lacks(monkeypatc
 
 
 def test_one_as_messages_are_taken_has_their_topic_subscribed_anew(monkeypatch, tmp_path):
-    sound, left = SimulatedSource.take, ["no such"]
+    sound, left = SimulatedSource.take, [KeyError()]
 
     def failing(source):
         if left:
-            raise KeyError(left.pop())
+            raise left.pop()
         return sound(source)
 
     monkeypatch.setattr(SimulatedSource, "take", failing)
@@ -159,4 +202,5 @@ def test_one_as_messages_are_taken_has_their_topic_subscribed_anew(monkeypatch, 
     )
     again = (do.served("/a", 0), do.served("/a", 1), do.ready(), do.sets(20), *_OUT)
     seen = _play(tmp_path, *steps, *again)
-    assert sum("KeyError('no such')" in each for each in seen.log) == 1
+    assert sum("KeyError()" in each for each in seen.log) == 1
+    assert "the relay cannot receive /a as geometry_msgs/msg/Vector#Stamped: KeyError" in seen.log

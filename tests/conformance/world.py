@@ -80,8 +80,12 @@ class World(Protocol):
         """Have the relay's node join, with these remaps; the node and its backend."""
         ...
 
-    def hold(self, node: Any, topic: str, type_name: str) -> None:
-        """Have the relay's own process publish on a topic."""
+    def hold(self, node: Any, topic: str, type_name: str) -> object:
+        """Have the relay's own process publish on a topic, until `free`."""
+        ...
+
+    def free(self, node: Any, held: object) -> None:
+        """Have it publish there no more."""
         ...
 
     def wait_until(self, condition: Callable[[], object], what: str) -> None:

@@ -33,11 +33,12 @@ from tests.simulated.finding import search
 ROOT: Final = Path(__file__).parents[2]
 # The whole relay on a simulated ROS. Where scripts run a module, worlds are played too.
 _PLAYED: Final = "tests/conformance"
+_EVALUATED: Final = "tests/simulated/test_evaluation.py"
 ROOMS: Final = {
     "sync": ["tests/sync"],
-    "explain": ["tests/explain", "tests/status", "tests/cli/test_tap.py"],
-    "dataflow": ["tests/dataflow", "tests/status/test_taps.py", _PLAYED],
-    "relay": [_PLAYED, "tests/ros"],
+    "explain": ["tests/explain", "tests/bank/test_known.py", "tests/status", "tests/cli/test_tap.py"],
+    "dataflow": ["tests/dataflow", "tests/status/test_taps.py", _PLAYED, _EVALUATED],
+    "relay": [_PLAYED, _EVALUATED, "tests/ros"],
     "recordings/bag": ["tests/recordings/bag", "tests/recordings/analysis", "tests/recordings/datasets"],
 }
 _LEFT_OUT: Final = "not (ros or browser or peer or process or real_data)"

@@ -357,10 +357,12 @@ class Participant:
         self.bus.may_make(endpoint)
         held = next((each.type for each in self.endpoints if each.topic == endpoint.topic), endpoint.type)
         if held != endpoint.type:
-            kind = "publisher" if endpoint.is_writer else "subscription"
+            if not endpoint.is_writer:
+                # Observed: rcl replaces the words of rmw_fastrtps by these.
+                raise RefusedByDdsError("Failed to create subscription: invalid allocator")
             # The words of rmw_fastrtps, which rcl passes on.
             raise RefusedByDdsError(
-                f"Failed to create {kind}: create_{kind}() called for existing topic name rt{endpoint.topic}"
+                f"Failed to create publisher: create_publisher() called for existing topic name rt{endpoint.topic}"
                 f" with incompatible type {endpoint.type.replace('/', '::').replace('::msg::', '::msg::dds_::')}_"
             )
         self.endpoints[endpoint] = None
