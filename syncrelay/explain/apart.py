@@ -38,14 +38,15 @@ def over_tolerances(facts: GroupFacts, index: int | None = None) -> str | None:
 
     Without `index`, both are required. None if there are no such two.
     """
-    required = [each for each in facts.inputs if each.required]
+    if facts.tolerance is None:
+        return None
+    slop, required = facts.tolerance.ns, [each for each in facts.inputs if each.required]
     pairs = combinations(required, 2) if index is None else ((facts.inputs[index], each) for each in required)
     for pair in pairs:
-        if facts.tolerance is None or all(each.narrowed is None for each in pair):
-            continue
-        slop, distances = facts.tolerance.ns, np.abs(_distances(*pair))
-        room = sum(slop // 2 if each.narrowed is None else min(each.narrowed.ns, slop // 2) for each in pair)
-        over = distances[(distances > room) & (distances <= slop)]
+        distances = np.abs(_distances(*pair))
+        # Of two inputs without a tolerance, this is twice slop: nothing is over it.
+        twice = sum(slop if each.narrowed is None else min(2 * each.narrowed.ns, slop) for each in pair)
+        over = distances[(2 * distances > twice) & (distances <= slop)]
         if len(distances) >= _FEWEST and len(over) > (1 - FEW) * len(distances):
             halves = (
                 f"half of {facts.tolerance.key} {words.duration(slop)}"
@@ -55,7 +56,7 @@ def over_tolerances(facts: GroupFacts, index: int | None = None) -> str | None:
             )
             names = " and ".join(each.name for each in pair)
             usual, limit = quantile(np.sort(distances), 0.5), f"over {' plus '.join(halves)}"
-            if usual > room:
+            if 2 * usual > twice:
                 return f"stamps of {names} are usually {words.duration(usual)} apart, {limit}"
             share, most = words.share(len(over) / len(distances)), words.duration(int(over.max()))
             return f"in {share} of messages, stamps of {names} are up to {most} apart, {limit}"

@@ -36,7 +36,8 @@ class Suggester:
     ) -> None:
         self._config = config
         self._recent = recent
-        self._budget = budget or TryBudget(clock=None)
+        # Without one to share, time does not count: `int` is a clock that stands still at 0.
+        self._budget = budget or TryBudget(clock=int)
         self._is_shared = budget is not None
         self._whole = whole
         self._most_messages = _MOST_MESSAGES

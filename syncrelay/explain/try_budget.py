@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final
 
-from syncrelay.runtime import SYSTEM
 from syncrelay.sync import Message
 
 # A run costs 3 to 20 us a message, by what the engine has to do: a few runs for a group alone ...
@@ -18,18 +17,18 @@ class TryBudget:
     """How much may be tried out until the next poll, by all groups that share it.
 
     It is a number of messages that are run through engines, and a share of the processor's time by `clock`, in
-    nanoseconds, which usually ends first. Without a clock, or with one that stands still, only the messages count: what
-    is tried out is then the same on any machine.
+    nanoseconds, which usually ends first. With a clock that stands still, only the messages count: what is tried out is
+    then the same on any machine.
     """
 
-    def __init__(self, clock: Callable[[], int] | None = SYSTEM.thread_time_ns) -> None:
+    def __init__(self, clock: Callable[[], int]) -> None:
         self._clock = clock
         self._is_wanted = False
         self.refill()
 
     def refill(self) -> None:
         """Begin a poll."""
-        self._began = self._clock() if self._clock else 0
+        self._began = self._clock()
         self._left = _MESSAGES
         self._has_finished = False
         self.is_short, self._is_wanted = self._is_wanted, False
@@ -50,14 +49,14 @@ class TryBudget:
         The first of a poll may take as long as it needs: on a slow machine none would end else.
         """
         for number, each in enumerate(messages):
-            if self._clock and self._has_finished and number % _ASKED_EVERY == 0 and self._spent() >= _ENDS_NS:
+            if self._has_finished and number % _ASKED_EVERY == 0 and self._spent() >= _ENDS_NS:
                 raise OutOfTimeError
             self._left -= 1
             yield each
         self._has_finished = True
 
     def _spent(self) -> int:
-        return self._clock() - self._began if self._clock else 0
+        return self._clock() - self._began
 
 
 class OutOfTimeError(Exception):

@@ -41,7 +41,7 @@ def _missed(share: float, count: int) -> int:
 
 @pytest.mark.long
 def test_the_first_sentence_names_the_fault_that_was_drawn():
-    count = chosen(short=40, long=2000)
+    count = chosen(short=12, long=2000)
     results = [play(drawn(seed, tuple(KINDS), 1)) for seed in range(_FIRST, _FIRST + count)]
     told = [each for each in results if each.score is Score.TOLD]
     missed = [(each.drawn.seed, each.drawn.kinds, each.score.value, each.why) for each in results if each not in told]
@@ -73,7 +73,7 @@ def test_who_looks_for_10_s_calls_no_group_healthy_that_lacks_sets_and_names_the
 
 @pytest.mark.long
 def test_of_two_faults_one_is_named_and_the_other_once_that_one_is_mended(figures):
-    count = chosen(short=30, long=1000)
+    count = chosen(short=10, long=1000)
     results = [play(drawn(seed, tuple(KINDS), 2)) for seed in range(_FIRST, _FIRST + count)]
     missed = [
         (each.drawn.seed, each.drawn.kinds, each.score.value, each.why)
@@ -92,7 +92,7 @@ def test_of_two_faults_one_is_named_and_the_other_once_that_one_is_mended(figure
 
 @pytest.mark.long
 def test_of_a_rig_that_is_well_nothing_is_said():
-    count = chosen(short=15, long=2000)
+    count = chosen(short=5, long=2000)
     results = [play(drawn(seed, (), 0)) for seed in range(_FIRST, _FIRST + count)]
     warned = [(each.drawn.seed, each.said, each.lasted) for each in results if each.score is not Score.TOLD]
     assert len(warned) <= _missed(_WELL, count), warned

@@ -11,6 +11,7 @@ from syncrelay.explain import Code, Finding, GroupWatch, InputGraph, Severity, e
 from tests.explain.scenario import Source, Told, run
 from tests.explain.support.cases_stamps import AT_TICKS
 from tests.explain.support.groups import S, a_silent_group, an_input
+from tests.faults.extent import chosen
 
 CAMERA = Source("/camera", hz=30)
 
@@ -86,7 +87,7 @@ def a_device(chance: random.Random) -> Device:
     return Device((Source("/quick", hz=4 * hz), device), ticks_hz, f"{round(periods * 1000 / hz) + 5}ms", is_young)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(chosen(short=10, long=100)))
 def test_a_device_is_offered_to_be_mapped_where_that_brings_the_sets_of_a_clock(seed):
     device = a_device(random.Random(seed))
     finding = device.last_finding()

@@ -46,7 +46,7 @@ def farthest_ms(rig: Trials, late_ms: float) -> float:
 
 def test_what_is_certain_is_paired_rightly_however_long_its_messages_take():
     certain = 0
-    for seed in range(chosen(short=300, long=5000)):
+    for seed in range(chosen(short=200, long=5000)):
         chance = random.Random(f"pairing {seed}")
         period = chance.choice([1, 20, 100, 1000])
         other = period * chance.choice([0.1, 0.5, 1, 2, 10])
@@ -58,4 +58,4 @@ def test_what_is_certain_is_paired_rightly_however_long_its_messages_take():
             certain += 1
             assert farthest_ms(rig, late) <= 1.01 * slop, (seed, period, other, phase, late, slop)
     # Not all that is certain is refused.
-    assert certain > 0.2 * chosen(short=300, long=5000)
+    assert certain > 0.2 * chosen(short=200, long=5000)

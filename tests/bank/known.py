@@ -1,0 +1,142 @@
+"""What is said of draws with fixed seeds, from their begin to their end, and shown in the status."""
+
+import contextlib
+import hashlib
+import json
+import random
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from syncrelay.config import ConfigError
+from syncrelay.explain import ClockState, Finding, GroupFacts, GroupReport, explanation, with_ok
+from syncrelay.explain.finding_log import Remark
+from syncrelay.status.state import group_of
+from tests.bank.kinds import KINDS
+from tests.bank.play import Drawn, drawn, publishers_of
+from tests.bank.rig import S
+from tests.explain.scenario import Source, run
+from tests.explain.scenario import group_of as scenario_group_of
+
+KNOWN: Final = Path(__file__).with_name("known.txt")
+
+
+# What else a file may ask for, and what may happen beside a fault: each draw that is varied has some of either.
+_KEYS: Final[tuple[dict[str, Any], ...]] = (
+    {},
+    {"max_rate": "3 Hz"},
+    {"max_wait": "80ms"},
+    {"quorum": 2},
+    {"queue_size": 3},
+    {"slop": "150ms"},
+    {"policy": "latest_time", "trigger": "5 Hz", "max_age": "1s", "max_wait": "20ms"},
+)
+_OF_INPUT: Final[tuple[dict[str, Any], ...]] = (
+    {},
+    {"tolerance": "4ms"},
+    {"required": False},
+    {"stamp": "receive"},
+    {"clock": "device"},
+    {"offset": "3ms"},
+    {"min_period": "20ms"},
+)
+
+
+def _is_paused(chance: random.Random, at: float) -> dict[str, Any]:
+    return {"paused": [(at, at + chance.uniform(2, 8))]}
+
+
+def _sleeps(chance: random.Random, at: float) -> dict[str, Any]:
+    return {"sleeps": [(round(at), round(at + chance.uniform(2, 8)))]}
+
+
+def _stands_still(chance: random.Random, at: float) -> dict[str, Any]:
+    return {"stops": [(at, at + chance.uniform(0.3, 3))]}
+
+
+def _clock_stops(chance: random.Random, at: float) -> dict[str, Any]:
+    end = at + chance.uniform(4, 9)
+    return {
+        "facts": lambda second: {
+            "clock": ClockState(received=True, stopped=round((second - at) * S) if at < second < end else None)
+        }
+    }
+
+
+def _leaves_what_was_lost(chance: random.Random, at: float) -> dict[str, Any]:
+    lost = chance.randrange(1, 50)
+    return {"facts": lambda second: {"waited": round(lost * 0.02 * S) if second > at else 0, "is_look": lost % 2 == 0}}
+
+
+def _nothing(_chance: random.Random, _at: float) -> dict[str, Any]:
+    return {}
+
+
+_BESIDE: Final = (_nothing, _is_paused, _sleeps, _stands_still, _clock_stops, _leaves_what_was_lost)
+
+
+class Fixed(NamedTuple):
+    """A draw by its seed and kinds: of one fault, of two of all, or of none; its rig may be varied."""
+
+    seed: int
+    kinds: tuple[str, ...]
+    n_faults: int
+    is_varied: bool = False
+
+    @property
+    def name(self) -> str:
+        of = self.kinds[0] if len(self.kinds) == 1 else ("well", "one", "two")[self.n_faults]
+        return f"{self.seed} {of}{', varied' if self.is_varied else ''}"
+
+
+FIXED: Final = (
+    *(Fixed(seed, (kind,), 1, seed > 1) for kind in KINDS for seed in (1, 2, 3)),
+    *(Fixed(seed, tuple(KINDS), 2, seed > 9) for seed in range(20)),
+    *(Fixed(seed, (), 0, seed > 4) for seed in range(24)),
+)
+
+
+def known(fixed: Fixed) -> str:
+    """Write down when the code of what explains most changed, with its words, and a digest of all that is shown."""
+    draw = drawn(fixed.seed, fixed.kinds, fixed.n_faults)
+    words, sources, options, beside = fixed.name, draw.sources, draw.rig.options, dict[str, Any](stops=draw.rig.stops)
+    if fixed.is_varied:
+        words, sources, options, more = _varied(draw, random.Random(fixed.name))
+        beside |= more
+    lines, digest, before = [fixed.name, *([words] if fixed.is_varied else [])], hashlib.sha256(), ""
+
+    def hears(second: float, facts: GroupFacts, found: tuple[Finding, ...], remarks: list[Remark]) -> None:
+        nonlocal before
+        shown = explanation(with_ok(facts, found))
+        if shown.code.value != before:
+            before = shown.code.value
+            lines.append(f"{second:.2f} {before}: {shown.text}; {shown.suggestion or ''}")
+        lines.extend(f"{second:.2f} log: {each.text}" for each in remarks)
+        digest.update(json.dumps(group_of(GroupReport(facts, found)).as_dict()).encode())
+
+    shown = publishers_of(draw.rig.flows)
+    run(
+        *sources,
+        seconds=int(draw.seconds) + 1,
+        options=options,
+        publishers=shown,
+        looks=draw.looks,
+        hears=hears,
+        **beside,
+    )
+    return "\n".join([*lines, digest.hexdigest()[:12]])
+
+
+def _varied(draw: Drawn, chance: random.Random) -> tuple[str, list[Source], dict[str, Any], dict[str, Any]]:
+    """Draw what else is asked for and happens, as far as that goes together: in words, and as `run` takes it."""
+    while True:
+        keys, of_input, beside = chance.choice(_KEYS), chance.choice(_OF_INPUT), chance.choice(_BESIDE)
+        first, *others = draw.sources
+        required = bool(of_input.get("required", first.required))
+        options = {key: value for key, value in of_input.items() if key != "required"}
+        sources = [replace(first, required=required, topic_options={**first.topic_options, **options}), *others]
+        options = {**({"queue_size": 10} if "policy" in keys else draw.rig.options), **keys}
+        with contextlib.suppress(ConfigError):
+            scenario_group_of(sources, options)
+            words = f"with {keys}, {of_input} at {first.topic}, {beside.__name__.removeprefix('_')}"
+            return words, sources, options, beside(chance, draw.rig.begin + chance.uniform(2, 15))
