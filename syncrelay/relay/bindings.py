@@ -33,8 +33,8 @@ class GroupBinding:
     bundle: BundleOutput
 
     @property
-    def waiting_for(self) -> str | None:
-        """What keeps the group from giving sets, in words."""
+    def waiting_for(self) -> str:
+        """What keeps the group from giving sets, in words; empty where nothing does."""
         if self.group.failure is not None:
             return "a reload or restart: a bug stopped it"
         there = [not each.missing for each in sorted(self.inputs, key=lambda each: each.output.index)]
@@ -44,7 +44,7 @@ class GroupBinding:
             return f"a subscriber of {one_of(each.topic_name for each in self.publishers)}"
         if not missing and self.bundle.refusal is not None and not self.group.config.options.outputs:
             return f"its bundle, which cannot leave on {self.bundle.refusal.topic}"
-        return missing or None
+        return missing
 
     def feed(self) -> None:
         """Feed its inputs, those that are to be fed now. On the loop's thread."""

@@ -68,8 +68,8 @@ class Groups:
         self._flow = flow
         self._tape = tape
         self._changed = changed
-        # What each group waits for, as the log last said; None for a group that runs.
-        self._announced: dict[str, str | None] = {}
+        # What each group waits for, as the log last said; empty for a group that runs.
+        self._announced: dict[str, str] = {}
         self._started = self._runtime.monotonic()
         self._run(config)
 
@@ -228,7 +228,7 @@ class Groups:
             name, waiting_for = binding.group.config.name, binding.waiting_for
             if waiting_for and self._runtime.monotonic() - self._started < _GRACE_S:
                 continue
-            if name in self._announced and self._announced[name] == waiting_for:
+            if self._announced.get(name) == waiting_for:
                 continue
             self._announced[name] = waiting_for
             # The names after all remaps, as the graph shows them.

@@ -467,8 +467,8 @@ _LIFE: Final = (
         do.endpoints("/a", publishers=1, subscribers=0), do.transit("activate", "activate"), _EARS, do.ready(),
         do.sets(10), _out(1), do.feed("/a", 20), do.transit("deactivate"),
         do.endpoints("/a", publishers=1, subscribers=0), do.endpoints("/front/a", publishers=0),
-        do.finding("inactive"), do.says("front:   /a: 2 received, 1 in sets, 1 not needed"), do.transit("activate"),
-        do.ready(), do.sets(30), _out(2),
+        do.finding("inactive"), do.says("front:   /a: 2 received, 1 in sets, 1 not needed"), do.end("/b"),
+        do.sleep(3), do.publisher("/b"), do.transit("activate"), do.ready(), do.sets(30), _out(2),
         do.transit("deactivate", "cleanup", "configure", "cleanup")),
     long("a type that was taken stays when a managed node is activated again",
         _SENSORS, do.relay(_front({"topic": "/a"}, {"topic": "/b"}), node=_MANAGED),
@@ -537,30 +537,30 @@ _TRANSFORMS: Final = (
 )
 
 # Of ROS's own types, one that has fields for messages of two others.
-_BUNDLED: Final = group({"topic": "/a", "type": IMAGE, "stamp": "receive"},
+BUNDLED: Final = group({"topic": "/a", "type": IMAGE, "stamp": "receive"},
     {"topic": "/b", "type": COLOR, "stamp": "receive"}, policy="approximate_time_eager", slop="50s", outputs=False,
     bundle={"topic": "/set", "type": MARKER})
-_IMAGE: Final = b"\0\1\0\0" + bytes(8) + b"\1\0\0\0\0\0\0\0" * 2 + bytes(4)
-_COLOR: Final = b"\0\1\0\0" + bytes(16)
-_BUNDLE_SET: Final = (do.feed("/a", 0, data=_IMAGE), do.feed("/b", 0, data=_COLOR))
+IMAGE_DATA: Final = b"\0\1\0\0" + bytes(8) + b"\1\0\0\0\0\0\0\0" * 2 + bytes(4)
+COLOR_DATA: Final = b"\0\1\0\0" + bytes(16)
+BUNDLE_SET: Final = (do.feed("/a", 0, data=IMAGE_DATA), do.feed("/b", 0, data=COLOR_DATA))
 _BUNDLES: Final = (
     long("sets leave in bundles, by the publisher that fits their inputs and the file",
-        do.publisher("/a", of=IMAGE), do.publisher("/b", of=COLOR), do.relay({"front": _BUNDLED}),
-        do.subscriber("/set", of=MARKER, reliability="best_effort"), do.ready(), _BUNDLE_SET, do.out("/set", 1),
-        do.file({"front": {**_BUNDLED, "slop": "49s"}}), do.call("reload"), _BUNDLE_SET, do.out("/set", 2),
+        do.publisher("/a", of=IMAGE), do.publisher("/b", of=COLOR), do.relay({"front": BUNDLED}),
+        do.subscriber("/set", of=MARKER, reliability="best_effort"), do.ready(), BUNDLE_SET, do.out("/set", 1),
+        do.file({"front": {**BUNDLED, "slop": "49s"}}), do.call("reload"), BUNDLE_SET, do.out("/set", 2),
         do.endpoints("/set", publishers=1, subscribers=1), do.end("/a"),
         do.publisher("/a", of=IMAGE, reliability="best_effort"),
-        do.endpoints("/set", publishers=1, reliability="best_effort"), do.ready(), _BUNDLE_SET, do.out("/set", 3),
-        do.file({"front": {**_BUNDLED, "outputs": True}}), do.call("reload"), do.endpoints("/front/b", publishers=1),
+        do.endpoints("/set", publishers=1, reliability="best_effort"), do.ready(), BUNDLE_SET, do.out("/set", 3),
+        do.file({"front": {**BUNDLED, "outputs": True}}), do.call("reload"), do.endpoints("/front/b", publishers=1),
         do.file({"rear": group("/c", "/d")}), do.call("reload"), do.endpoints("/set", publishers=0),
         blind=("outputs",)),
     long("bundles of a type that is not there",
         do.publisher("/a", of=IMAGE), do.publisher("/b", of=COLOR),
-        do.relay({"front": {**_BUNDLED, "bundle": {"topic": "/set", "type": "missing_msgs/msg/Set"}}}),
+        do.relay({"front": {**BUNDLED, "bundle": {"topic": "/set", "type": "missing_msgs/msg/Set"}}}),
         do.finding("no_bundle", naming="/set")),
     long("a managed node that is deactivated ends its bundles and leaves the transforms",
         do.publisher("/a", of=IMAGE), do.publisher("/b", of=COLOR), do.publisher("/tf", of=TF),
-        do.relay({"front": {**_BUNDLED, "transforms": {"target": "odom", "wait": "1s"}}}, node=_MANAGED), do.sleep(1),
+        do.relay({"front": {**BUNDLED, "transforms": {"target": "odom", "wait": "1s"}}}, node=_MANAGED), do.sleep(1),
         do.transit("configure", "activate"), do.ready(), do.endpoints("/set", publishers=1), do.transit("deactivate"),
         do.endpoints("/set", publishers=0), do.endpoints("/tf", publishers=1, subscribers=0)),
 )
@@ -581,7 +581,7 @@ def _refused(
     """A reload asks for something on a topic that the relay's own process holds with another type, until it is free."""
     a, b = types
     rear = group({"topic": "/a", "type": a, "stamp": "receive"}, row("/c"), policy="approximate_time_eager", slop="1s")
-    sets = [(do.write("/a", at, data=_IMAGE), do.write("/b", at, data=_COLOR)) if a == IMAGE else
+    sets = [(do.write("/a", at, data=IMAGE_DATA), do.write("/b", at, data=COLOR_DATA)) if a == IMAGE else
         (do.write("/a", at), do.write("/b", at)) for at in (10, 20)]
     return long(f"{what} that DDS refuses is asked for again",
         do.publisher("/a", of=a), do.publisher("/b", of=b), do.publisher("/c"), before,
@@ -600,7 +600,7 @@ _REFUSALS: Final = (
     _refused("a manifest", "/syncrelay/front/sets", _front(), diagnostics=None),
     _refused("the publisher of diagnostics", "/diagnostics", _front()),
     _refused("a figure for plotting", "/syncrelay/front/span_ms", _front(), diagnostics={"scalars": True}),
-    _refused("a bundle", "/set", {"front": _BUNDLED}, types=(IMAGE, COLOR)),
+    _refused("a bundle", "/set", {"front": BUNDLED}, types=(IMAGE, COLOR)),
     _refused("the topic of transforms", "/tf", _front(transforms={"target": "odom", "wait": "50ms"}),
         do.publisher("/tf_static", of=TF)),
     long("a reload gives an output's name to the messages of another type that come already",

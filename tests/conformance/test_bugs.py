@@ -20,10 +20,11 @@ from syncrelay.relay.ports import Answer, RclError
 from syncrelay.relay.relay import Relay
 from syncrelay.sync.group import SyncGroup
 from tests.conformance.player import play
-from tests.conformance.script import PAIR, REFERENCE, do, group, short
+from tests.conformance.script import COLOR, IMAGE, MARKER, PAIR, REFERENCE, do, group, short
+from tests.conformance.scripts import BUNDLE_SET, BUNDLED, COLOR_DATA, IMAGE_DATA
 from tests.conformance.seen import Seen
 from tests.conformance.simulated import SimulatedWorld
-from tests.simulated.node import SimulatedNode, SimulatedSource
+from tests.simulated.node import SimulatedGraph, SimulatedNode, SimulatedSource
 
 _SENSORS = (do.publisher("/a"), do.publisher("/b"))
 _EARS = (do.subscriber("/front/a"), do.subscriber("/front/b"))
@@ -204,3 +205,28 @@ def test_one_as_messages_are_taken_has_their_topic_subscribed_anew(monkeypatch, 
     seen = _play(tmp_path, *steps, *again)
     assert sum("KeyError()" in each for each in seen.log) == 1
     assert "the relay cannot receive /a as geometry_msgs/msg/Vector#Stamped: KeyError" in seen.log
+
+
+def test_no_bundle_leaves_while_an_input_has_another_definition_of_its_type_than_the_bundle(monkeypatch, tmp_path):
+    pytest.importorskip("visualization_msgs")
+    sound = SimulatedGraph._info  # noqa: SLF001  definitions are not simulated
+
+    def told(graph, each):
+        return sound(graph, each)._replace(type_hash=f"RIHS01_{each.node.name == 'other'}")
+
+    monkeypatch.setattr(SimulatedGraph, "_info", told)
+    seen = _play(
+        tmp_path,
+        *(do.publisher("/a", of=IMAGE), do.publisher("/b", of=COLOR), do.relay({"front": BUNDLED})),
+        *(do.subscriber("/set", of=MARKER), do.ready(), *BUNDLE_SET, do.out("/set", 1)),
+        *(do.publisher("/a", of=IMAGE, by="other", name="other"), do.endpoints("/set", publishers=0)),
+        *(do.finding("no_bundle", naming="/other"), do.write("/a", 0, data=IMAGE_DATA)),
+        *(do.write("/b", 0, data=COLOR_DATA), do.sleep(1), do.counts(), do.end("other")),
+        *(do.endpoints("/set", publishers=1), do.ready(), *BUNDLE_SET, do.out("/set", 2), do.counts()),
+    )
+    why = (
+        "the relay cannot publish /set as visualization_msgs/msg/Marker: /other publishes /a with another definition of"
+    )
+    assert [each for each in seen.log if each.startswith(why)]
+    assert [each[1] for each in seen.notes if each[0] == "counts"] == [("/a", 2, 2, 0, {}), ("/a", 3, 3, 0, {})]
+    assert len(seen.outputs["/set"]) == 2
