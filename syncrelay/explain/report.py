@@ -67,8 +67,7 @@ class GroupReport:
 
         While enough sets leave, by what most of them were. Else each may be what is to be seen, unless none was needed.
         """
-        reasons = self._unneeded[drop.input] if drop.input < len(self._unneeded) else frozenset()
-        return drop._replace(unneeded=drop.reason in reasons)
+        return drop._replace(unneeded=drop.reason in self._unneeded[drop.input])
 
     @cached_property
     def _unneeded(self) -> tuple[frozenset[DropReason], ...]:

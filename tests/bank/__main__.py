@@ -13,7 +13,7 @@ from functools import partial
 from typing import NamedTuple
 
 from tests.bank.kinds import KINDS
-from tests.bank.known import FIXED, known
+from tests.bank.known import fixed, known
 from tests.bank.mended import mended
 from tests.bank.play import Score, described, drawn, play
 
@@ -53,7 +53,7 @@ def main() -> int:
     parser.add_argument("--known", action="store_true", help="print what is known of fixed draws")
     asked = parser.parse_args()
     if asked.known:
-        _say("\n\n".join(map(known, FIXED)))
+        _say("\n\n".join(map(known, fixed())))
         return 0
     kinds = tuple(asked.kinds.split(","))
     if asked.show is not None:

@@ -8,9 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from syncrelay.config import ConfigError
-from syncrelay.explain import ClockState, Finding, GroupFacts, GroupReport, explanation, with_ok
+from syncrelay.explain import CauseLog, ClockState, Finding, GroupFacts, GroupReport, explanation, with_ok
 from syncrelay.explain.finding_log import Remark
+from syncrelay.explain.troubles import troubles
 from syncrelay.status.state import group_of
 from tests.bank.kinds import KINDS
 from tests.bank.play import Drawn, drawn, publishers_of
@@ -19,6 +22,7 @@ from tests.explain.scenario import Source, run
 from tests.explain.scenario import group_of as scenario_group_of
 
 KNOWN: Final = Path(__file__).with_name("known.txt")
+"""Of each draw a block that begins with its name: a line that is added, as `8 tai varied`, is one draw more."""
 
 
 # What else a file may ask for, and what may happen beside a fault: each draw that is varied has some of either.
@@ -40,6 +44,9 @@ _OF_INPUT: Final[tuple[dict[str, Any], ...]] = (
     {"offset": "3ms"},
     {"min_period": "20ms"},
 )
+
+
+# What happens beside.
 
 
 def _is_paused(chance: random.Random, at: float) -> dict[str, Any]:
@@ -79,31 +86,36 @@ class Fixed(NamedTuple):
     """A draw by its seed and kinds: of one fault, of two of all, or of none; its rig may be varied."""
 
     seed: int
-    kinds: tuple[str, ...]
-    n_faults: int
-    is_varied: bool = False
+    kinds: str
+    is_varied: bool
+
+    @classmethod
+    def named(cls, name: str) -> "Fixed":
+        seed, kinds, *varied = name.split()
+        return cls(int(seed), kinds, bool(varied))
 
     @property
     def name(self) -> str:
-        of = self.kinds[0] if len(self.kinds) == 1 else ("well", "one", "two")[self.n_faults]
-        return f"{self.seed} {of}{', varied' if self.is_varied else ''}"
+        return f"{self.seed} {self.kinds}{' varied' if self.is_varied else ''}"
+
+    def drawn(self) -> Drawn:
+        n_faults = {"well": 0, "two": 2}.get(self.kinds, 1)
+        return drawn(self.seed, tuple(KINDS) if n_faults != 1 else (self.kinds,), n_faults)
 
 
-FIXED: Final = (
-    *(Fixed(seed, (kind,), 1, seed > 1) for kind in KINDS for seed in (1, 2, 3)),
-    *(Fixed(seed, tuple(KINDS), 2, seed > 9) for seed in range(20)),
-    *(Fixed(seed, (), 0, seed > 4) for seed in range(24)),
-)
+def fixed() -> list[Fixed]:
+    """Return the draws that the file names."""
+    return [Fixed.named(block.partition("\n")[0]) for block in KNOWN.read_text().split("\n\n")]
 
 
 def known(fixed: Fixed) -> str:
     """Write down when the code of what explains most changed, with its words, and a digest of all that is shown."""
-    draw = drawn(fixed.seed, fixed.kinds, fixed.n_faults)
-    words, sources, options, beside = fixed.name, draw.sources, draw.rig.options, dict[str, Any](stops=draw.rig.stops)
+    draw, lines, digest, before, log = fixed.drawn(), [fixed.name], hashlib.sha256(), "", CauseLog()
+    sources, options, beside = draw.sources, draw.rig.options, dict[str, Any](stops=draw.rig.stops)
     if fixed.is_varied:
         words, sources, options, more = _varied(draw, random.Random(fixed.name))
+        lines.append(words)
         beside |= more
-    lines, digest, before = [fixed.name, *([words] if fixed.is_varied else [])], hashlib.sha256(), ""
 
     def hears(second: float, facts: GroupFacts, found: tuple[Finding, ...], remarks: list[Remark]) -> None:
         nonlocal before
@@ -111,24 +123,44 @@ def known(fixed: Fixed) -> str:
         if shown.code.value != before:
             before = shown.code.value
             lines.append(f"{second:.2f} {before}: {shown.text}; {shown.suggestion or ''}")
-        lines.extend(f"{second:.2f} log: {each.text}" for each in remarks)
-        digest.update(json.dumps(group_of(GroupReport(facts, found)).as_dict()).encode())
+        log.hear(facts, found, remarks, now=facts.figures.now)
+        logged = [line.text for line in log.lines(now=facts.figures.now)]
+        told = [each.text for each in troubles([(facts, found)], log.published_by)]
+        digest.update(json.dumps([group_of(GroupReport(facts, found)).as_dict(), logged, told]).encode())
 
     shown = publishers_of(draw.rig.flows)
-    run(
-        *sources,
-        seconds=int(draw.seconds) + 1,
-        options=options,
-        publishers=shown,
-        looks=draw.looks,
-        hears=hears,
-        **beside,
-    )
+    seconds = int(draw.seconds) + 1
+    run(*sources, seconds=seconds, options=options, publishers=shown, looks=draw.looks, hears=hears, **beside)
     return "\n".join([*lines, digest.hexdigest()[:12]])
+
+
+def _on_a_grid(draw: Drawn, chance: random.Random) -> str:
+    """Have all happen at few moments: what is compared with a limit is then often equal to it."""
+    ms = chance.choice([5, 20, 50, 100])
+    step = ms * 1_000_000
+    for flow in draw.rig.flows:
+        flow.stamps, flow.received = flow.stamps - flow.stamps % step, flow.received - flow.received % step
+    draw.looks[:] = [float(second) for second in range(1, int(draw.seconds) + 1)]
+    return f"on a grid of {ms} ms, "
+
+
+def _with_losses(draw: Drawn, chance: random.Random) -> str:
+    share = chance.uniform(0.01, 0.2)
+    for flow in draw.rig.flows:
+        flow.keep(np.array([chance.random() > share for _ in flow.true], dtype=np.bool_))
+    return f"without {share:.0%} of the messages, "
+
+
+def _as_drawn(_draw: Drawn, _chance: random.Random) -> str:
+    return ""
+
+
+_CHANGED: Final = (_as_drawn, _on_a_grid, _on_a_grid, _with_losses)
 
 
 def _varied(draw: Drawn, chance: random.Random) -> tuple[str, list[Source], dict[str, Any], dict[str, Any]]:
     """Draw what else is asked for and happens, as far as that goes together: in words, and as `run` takes it."""
+    changed = chance.choice(_CHANGED)(draw, chance)
     while True:
         keys, of_input, beside = chance.choice(_KEYS), chance.choice(_OF_INPUT), chance.choice(_BESIDE)
         first, *others = draw.sources
@@ -138,5 +170,5 @@ def _varied(draw: Drawn, chance: random.Random) -> tuple[str, list[Source], dict
         options = {**({"queue_size": 10} if "policy" in keys else draw.rig.options), **keys}
         with contextlib.suppress(ConfigError):
             scenario_group_of(sources, options)
-            words = f"with {keys}, {of_input} at {first.topic}, {beside.__name__.removeprefix('_')}"
+            words = f"{changed}with {keys}, {of_input} at {first.topic}, {beside.__name__.removeprefix('_')}"
             return words, sources, options, beside(chance, draw.rig.begin + chance.uniform(2, 15))

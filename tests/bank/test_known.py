@@ -2,12 +2,10 @@
 
 import pytest
 
-from tests.bank.known import FIXED, KNOWN, known
-
-_KNOWN = {text.splitlines()[0]: text.splitlines() for text in KNOWN.read_text().split("\n\n")}
+from tests.bank.known import KNOWN, Fixed, known
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("fixed", FIXED, ids=[each.name for each in FIXED])
-def test_what_is_said_of_a_draw_is_what_is_known(fixed):
-    assert known(fixed).splitlines() == _KNOWN[fixed.name]
+@pytest.mark.parametrize("block", KNOWN.read_text().split("\n\n"), ids=lambda block: block.partition("\n")[0])
+def test_what_is_said_of_a_draw_is_what_is_known(block):
+    assert known(Fixed.named(block.partition("\n")[0])).splitlines() == block.splitlines()
