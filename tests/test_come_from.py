@@ -1,4 +1,4 @@
-"""What the pages for users of message_filters and topic_tools make of nodes of public projects, run."""
+"""What the pages for users of message_filters, topic_tools and Autoware make of nodes of public projects, run."""
 
 import re
 from pathlib import Path
@@ -8,10 +8,7 @@ import pytest
 from syncrelay.recordings.cases import check, load_suite_text
 
 _HOWTO = Path(__file__).parents[1] / "docs" / "howto"
-_MESSAGE_FILTERS, _TOPIC_TOOLS = (
-    dict(re.findall(r"^```yaml\n(version: 1\ngroups:\n  (?=(\w+)).*?)^```", page, re.DOTALL | re.MULTILINE))
-    for page in [(_HOWTO / f"from_{name}.md").read_text() for name in ("message_filters", "topic_tools")]
-)
+_PAGES = [(_HOWTO / f"from_{name}.md").read_text() for name in ("message_filters", "topic_tools", "autoware")]
 _CASES = {
     "stereo": """
   what has one stamp leaves at once, and what is older is superseded:
@@ -38,6 +35,28 @@ _CASES = {
       -> b: aAc stamped A
       -> d: bBd stamped b
 """,
+    "outliers": """
+  grid and cloud of one stamp leave when the later one has come, and a cloud without its grid is superseded:
+    drawing: |
+      map        |a....c
+      pointcloud |AB...C
+      arrive: A B a c C
+      -> a: aA
+      -> C: B superseded, cC
+  the oldest of six clouds without a grid overflows:
+    drawing: |
+      map        |.......
+      pointcloud |ABCDEF.
+      -> F: A overflow
+""",
+    "merged": """
+  the nearest two get the stamp of the first, however far apart they are:
+    drawing: |
+      clustering/objects  |a.........b.........c
+      centerpoint/objects |....A.........B......
+      -> b: aA stamped a
+      -> c: bB stamped b
+""",
     "calibration": """
   a pair leaves four times a second:
     inputs:
@@ -62,7 +81,11 @@ _CASES = {
     expect: {sets: ">= 28", span_max: "<= 20ms", inputs: {color/points: {in_sets: "<= 31"}}}
 """,
 }
-_FILES = {name: text for page in (_MESSAGE_FILTERS, _TOPIC_TOOLS) for text, name in page.items() if name in _CASES}
+_FILES = {
+    name: text
+    for page in _PAGES
+    for text, name in re.findall(r"^```yaml\n(version: 1\ngroups:\n  (?=(\w+)).*?)^```", page, re.DOTALL | re.MULTILINE)
+}
 
 
 @pytest.mark.parametrize("name", _CASES)

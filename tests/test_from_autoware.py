@@ -11,7 +11,7 @@ from syncrelay.explain.dry_run import EngineDriver
 from syncrelay.sync import Match, Message
 
 _PAGE = (Path(__file__).parents[1] / "docs/howto/from_autoware.md").read_text()
-_NAIVE, _ADVANCED = re.findall(r"^```yaml\n(.*?)^```", _PAGE, re.DOTALL | re.MULTILINE)
+_NAIVE, _ADVANCED = re.findall(r"^```yaml\n(version: 1\ngroups:\n  lidars:.*?)^```", _PAGE, re.DOTALL | re.MULTILINE)
 # Of autoware_pointcloud_preprocessor's concatenate_and_time_sync_node.param.yaml, and of its strategy `advanced`.
 _PARAMETERS = [
     "debug_mode",
