@@ -15,6 +15,7 @@ from docs.generate.commands import exit_codes, relay, the_commands
 from docs.generate.facts import facts
 from docs.generate.findings import findings, matching
 from docs.generate.keys import of_file, of_group, of_model, of_topic, policies
+from docs.generate.library import names
 from docs.generate.metrics import metrics, scalars
 from docs.generate.status import objects
 from syncrelay.status.server import PATHS_TOLD
@@ -43,6 +44,7 @@ def pages() -> Mapping[str, str]:
         },
         "status.md": {"objects": objects()},
         "facts.md": {"facts": facts()},
+        "library.md": {"names": names()},
         "metrics.md": {"paths": PATHS_TOLD, "metrics": metrics(), "scalars": scalars()},
     }
     templates = Environment(
