@@ -99,6 +99,7 @@ def _streams(heard: "Heard") -> "Iterator[tuple[Channel, Stream]]":
 
     for number, topic in enumerate(heard.topics):
         profile = Profile(reliability="reliable" if topic.is_reliable else "best_effort")
-        stream = Stream(topic.name, topic.type, received=topic.received, places=topic.places)
-        stream.stamps.extend(UNREADABLE if stamp is None else stamp for stamp in topic.stamps)
+        stamps = [UNREADABLE if stamp is None else stamp for stamp in topic.stamps]
+        messages = [*zip(stamps, topic.received, topic.places, strict=True)]
+        stream = Stream.of(topic.name, topic.type, messages)
         yield Channel(number, topic.name, topic.type, Encoding.CDR, qos=(profile,)), stream

@@ -114,6 +114,20 @@ def shifted(stamps: Nanoseconds, offset: int) -> Nanoseconds:
     return moved
 
 
+def extents(stamps: Nanoseconds, offsets: Sequence[int]) -> tuple[Nanoseconds, Nanoseconds]:
+    """Return the earliest and the latest stamp of sets, offsets added: a row a set, UNREADABLE where it lacks an input.
+
+    Of a set without any, the earliest is after the latest.
+    """
+    begins, ends = np.full(len(stamps), _LATEST, dtype=np.int64), np.full(len(stamps), -_LATEST, dtype=np.int64)
+    for index, offset in enumerate(offsets):
+        of_input = shifted(stamps[:, index], offset)
+        there = stamps[:, index] != UNREADABLE
+        np.minimum(begins, of_input, out=begins, where=there)
+        np.maximum(ends, of_input, out=ends, where=there)
+    return begins, ends
+
+
 def sides(stamps: Nanoseconds, others: Nanoseconds) -> Sides:
     """Find the nearest of other stamps, in order, on both sides of each stamp."""
     at = np.searchsorted(others, stamps, side="left")

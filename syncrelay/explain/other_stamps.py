@@ -237,6 +237,7 @@ def _with_stamps(trials: Trials, index: int, stamps: Nanoseconds, changes: Chang
         messages=messages,
         inputs=inputs,
         is_window=True,
+        sets=None,
         kept={},
         _targets={},
         _runs={},

@@ -18,7 +18,6 @@ from syncrelay.config import Distance, GroupConfig
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
 from syncrelay.explain.changes import Change, Changes, changed, offset_change
-from syncrelay.explain.dry_run import EngineDriver
 from syncrelay.explain.epochs import time_scale
 from syncrelay.explain.nearest import (
     LONGEST,
@@ -32,8 +31,9 @@ from syncrelay.explain.nearest import (
     shifted,
     signed_distances,
 )
+from syncrelay.explain.set_spans import NOTHING, Run, match, of_one_moment
 from syncrelay.explain.widths import are_amid, tolerances, wander, with_headroom
-from syncrelay.sync import Match, Message, Outcome
+from syncrelay.sync import Message
 from syncrelay.sync.queues import LONGEST_QUEUE
 
 # Fewer possible sets are no evidence.
@@ -79,16 +79,6 @@ class Verdict(NamedTuple):
 UNTRIED: Final = Verdict(())
 
 
-class _Run(NamedTuple):
-    """The sets of one moment that a run of the engine gave: the spans that were possible, and those that they had."""
-
-    possible: Nanoseconds
-    given: Nanoseconds
-
-
-_NOTHING: Final = _Run(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
-
-
 @dataclass(frozen=True)
 class Trials:
     """Runs of a group's engine on messages, received at their payload's time; `inputs` holds the same as arrays.
@@ -100,10 +90,12 @@ class Trials:
     messages: Callable[[], Iterable[Message]]
     inputs: Sequence[Received]
     is_window: bool
+    sets: Callable[[], Iterable[Nanoseconds]] | None = None
+    """The sets that the group gives as it is, where they are known: a row a set, in which the stamps come first."""
     kept: dict[Hashable, Any] = field(default_factory=dict)
     """What other_stamps found out of these messages."""
     _targets: dict[int | None, PossibleSets | None] = field(default_factory=dict)
-    _runs: dict[Changes, dict[int | None, _Run]] = field(default_factory=dict)
+    _runs: dict[Changes, dict[int | None, Run]] = field(default_factory=dict)
 
     @property
     def runs(self) -> int:
@@ -147,7 +139,7 @@ class Trials:
 
     def given(self, changes: Changes, target: int | None = REQUIRED, *, within: int | None = None) -> int:
         """Return how many of the possible sets come together with changes; of those `within` a span, where one is."""
-        run = self._run(changes).get(self._target(target), _NOTHING)
+        run = self._run(changes).get(self._target(target), NOTHING)
         return len(run.given) if within is None else int(np.count_nonzero(run.possible <= within))
 
     def is_enough(self, changes: Changes, target: int | None = REQUIRED, *, within: int | None = None) -> bool:
@@ -160,43 +152,35 @@ class Trials:
         spans = self.spans(target)
         return len(spans) if within is None else int(np.count_nonzero(spans <= within))
 
-    def _run(self, changes: Changes) -> dict[int | None, _Run]:
+    def _run(self, changes: Changes) -> dict[int | None, Run]:
         if changes in self._runs:
             return self._runs[changes]
         config = changed(self.config, changes)
         # Thinning leaves sets out that came together.
         config = replace(config, options=config.options.model_copy(update={"every": 1, "max_rate": None}))
-        offsets = [topic.offset_ns for topic in config.topics]
-        counted: dict[int | None, tuple[PossibleSets, dict[int, int], tuple[list[int], list[int]]]] = {
-            target: (possible, dict(zip(possible.stamps.tolist(), possible.spans.tolist(), strict=True)), ([], []))
-            for target in (REQUIRED, *self.optional)
-            if (possible := self.possible(target)) is not None
+        possible = {
+            target: each for target in (REQUIRED, *self.optional) if (each := self.possible(target)) is not None
         }
+        found: dict[int | None, list[Run]] = {target: [] for target in possible}
 
-        def take(outcomes: Sequence[Outcome], _now: int) -> None:
-            for stamps, tick in ((each.stamps, each.tick) for each in outcomes if isinstance(each, Match)):
-                for possible, span_of, (expected, spans) in counted.values():
-                    pivot = tick if possible.is_at_ticks else stamps[possible.pivot]
-                    allowed = None if pivot is None else span_of.get(pivot)
-                    of_set = [
-                        stamp + offsets[index] for index in possible.among if (stamp := stamps[index]) is not None
-                    ]
-                    if allowed is not None and len(of_set) == len(possible.among):
-                        span = (max(of_set) if tick is None else tick) - min(of_set)
-                        if span <= possible.widest:
-                            expected.append(allowed)
-                            spans.append(span)
+        def count(sets: Nanoseconds) -> None:
+            for target, each in possible.items():
+                found[target].append(of_one_moment(each, config, sets))
 
-        EngineDriver(config, take).run(self.messages())
+        if changes or self.sets is None:
+            match(config, self.messages(), count)
+        else:
+            for sets in self.sets():
+                count(sets)
         self._runs[changes] = {
-            target: _Run(*(np.array(each, dtype=np.int64) for each in spans))
-            for target, (_, _, spans) in counted.items()
+            target: Run(*map(np.concatenate, zip(*runs, strict=True))) if runs else NOTHING
+            for target, runs in found.items()
         }
         return self._runs[changes]
 
     def spans_given(self, changes: Changes) -> Nanoseconds:
         """Return the spans of the sets of one moment that come together with changes."""
-        return self._run(changes).get(REQUIRED, _NOTHING).given
+        return self._run(changes).get(REQUIRED, NOTHING).given
 
     @cached_property
     def plan(self) -> Changes:
@@ -395,7 +379,7 @@ class Trials:
 
     def moved(self, change: Change) -> "Trials":
         """Return trials of the same messages with another offset."""
-        return replace(self, config=changed(self.config, (change,)), _targets={}, _runs={})
+        return replace(self, config=changed(self.config, (change,)), sets=None, _targets={}, _runs={})
 
     def by_offset(self, change: Change, target: int | None = REQUIRED) -> Tried | None:
         """Return what another offset gives if it brings messages together that are possible sets by then, else None."""

@@ -103,7 +103,7 @@ def analyze(recording: Recording, text: str, bindings: Sequence[GroupBinding]) -
         analyze_group(binding.group, of_group, text) for binding, of_group in zip(bindings, streams, strict=True)
     )
     distinct = {(stream.topic, id(stream)): stream for of_group in streams for stream in of_group}
-    topics = tuple(figures_of(stream) for stream in distinct.values() if stream.stamps)
+    topics = tuple(figures_of(stream) for stream in distinct.values() if len(stream.stamps))
     return Analysis(recording.begin, recording.end, topics, groups, text, tuple(recording.faults))
 
 
@@ -138,7 +138,7 @@ def analyze_group(group: GroupConfig, streams: tuple[Stream, ...], text: str) ->
     def changed(changes: Sequence[Change]) -> GroupConfig:
         return group_of(with_changes(apart, changes), group.name) if changes else group
 
-    trials = trials_of(group, streams)
+    trials = trials_of(group, streams, evaluation)
     suggestion = suggest(group, streams, trials, evaluation, changed)
     return GroupAnalysis(
         group=group,

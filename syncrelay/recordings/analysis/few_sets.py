@@ -4,9 +4,11 @@ from collections.abc import Collection, Iterator
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
+
 from syncrelay.config import GroupConfig
 from syncrelay.config.wording import counted
-from syncrelay.explain import words
+from syncrelay.explain import UNREADABLE, words
 from syncrelay.explain.changes import Change, changed
 from syncrelay.recordings.analysis.evaluation import evaluate
 from syncrelay.recordings.analysis.streams import Stream, read_streams
@@ -94,5 +96,6 @@ def _with(group: GroupConfig, **keys: object) -> GroupConfig:
 
 def _complete(group: GroupConfig, streams: tuple[Stream, ...], among: Collection[int]) -> int:
     """Return how many sets have a message of all these inputs: no more than of the one that the fewest have."""
-    sets = evaluate(group, streams).sets
-    return min(sum(each.stamps[index] is not None for each in sets) for index in among)
+    sets = evaluate(group, streams).sets.rows
+    missing = sum((np.count_nonzero(rows == UNREADABLE, axis=0) for rows in sets.blocks()), np.zeros(sets.width, int))
+    return int(len(sets) - missing[[*among]].max())

@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
 from syncrelay.config import Config, GroupConfig
@@ -28,15 +29,15 @@ class LiveStreams:
 
     def streams(self, group: GroupConfig) -> tuple[Stream, ...]:
         """Give a group's messages, a stream for each input."""
-        streams = tuple(
-            Stream(topic.topic, topic.type or "", mapping=Mapping() if topic.is_of_device else None)
-            for topic in group.topics
-        )
+        came: list[list[tuple[int, int, int]]] = [[] for _ in group.topics]
         for place, (index, stamp, received) in enumerate(self._last[group.name]):
-            streams[index].stamps.append(stamp)
-            streams[index].received.append(received)
-            streams[index].places.append(place)
-        return streams
+            came[index].append((stamp, received, place))
+        return tuple(
+            replace(
+                Stream.of(topic.topic, topic.type or "", messages), mapping=Mapping() if topic.is_of_device else None
+            )
+            for topic, messages in zip(group.topics, came, strict=True)
+        )
 
 
 def analyze_live(config: Config, groups: Sequence[GroupConfig], live: LiveStreams) -> Iterator[GroupAnalysis]:

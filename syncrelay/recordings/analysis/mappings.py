@@ -65,8 +65,8 @@ def mapped_inputs(group: GroupConfig, streams: Sequence[Stream]) -> Iterator[tup
         mapping = stream.mapping
         if mapping is None or not len(mapping.stamps):
             continue
-        mapped, received, _ = stream.numbers()
-        came = np.frombuffer(mapping.stamps, dtype=np.int64)
+        mapped, received, _ = stream.arrays()
+        came = mapping.stamps[:]
         is_set = (came != 0) & (came != UNREADABLE)
         came, mapped, received = came[is_set], mapped[is_set] + mapping.delay_ns, received[is_set]
         if not len(came):

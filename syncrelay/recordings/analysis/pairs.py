@@ -32,7 +32,7 @@ class Pair:
 def pair(first: Stream, second: Stream, offsets: tuple[int, int]) -> Pair | None:
     """Return how far the messages of the slower stream are from the other's; None where one has no stamps."""
     one, other = (
-        in_order(Received(*stream.numbers()), offset).stamps
+        in_order(Received(*stream.arrays()), offset).stamps
         for stream, offset in zip((first, second), offsets, strict=True)
     )
     if not len(one) or not len(other):

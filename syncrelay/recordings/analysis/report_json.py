@@ -1,18 +1,15 @@
 """An analysis for programs. All times and durations are nanoseconds, shares are of 1."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any, Final
+from typing import Any
 
-import numpy as np
-
+from syncrelay.explain.rows import Column
 from syncrelay.recordings.analysis import Analysis, GroupAnalysis, Topic
 from syncrelay.recordings.analysis.curves import Point
 from syncrelay.recordings.analysis.topics import spread
 from syncrelay.recordings.analysis.watching import LastingFinding
 from syncrelay.recordings.bag import Recording
-
-_LONGEST: Final = 2**63 - 1
 
 
 def as_json(name: str, analysis: Analysis) -> dict[str, Any]:
@@ -44,8 +41,8 @@ def _group(each: GroupAnalysis) -> dict[str, Any]:
         "name": each.group.name,
         "policy": each.group.options.policy,
         "sets": len(each.evaluation.sets),
-        "span": _quantity(one.span for one in each.evaluation.sets),
-        "latency": _quantity(one.latency for one in each.evaluation.sets),
+        "span": _quantity(each.evaluation.sets.spans),
+        "latency": _quantity(each.evaluation.sets.latencies),
         "inputs": [
             {
                 "topic": topic.topic,
@@ -81,10 +78,9 @@ def _group(each: GroupAnalysis) -> dict[str, Any]:
     }
 
 
-def _quantity(values: Iterable[int]) -> dict[str, Any] | None:
+def _quantity(values: Column) -> dict[str, Any] | None:
     """Return the spread of a quantity; None if there are no values."""
-    every = np.array([max(-_LONGEST, min(_LONGEST, value)) for value in values], dtype=np.int64)
-    return asdict(spread(every)) if len(every) else None
+    return asdict(spread(values[:])) if len(values) else None
 
 
 def _curves(each: GroupAnalysis) -> dict[str, Any]:

@@ -1,6 +1,5 @@
-"""The stamps of a recording, read once: all that the analysis asks for comes from these arrays."""
+"""The stamps of a recording, read once: all that the analysis asks for comes from these columns."""
 
-from array import array
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import repeat
@@ -10,6 +9,8 @@ import numpy as np
 
 from syncrelay.clock import DeviceClock, Step, host_times
 from syncrelay.config import GroupConfig, StampSource
+from syncrelay.explain.rows import Column as Numbers
+from syncrelay.explain.rows import Rows, blocks, no_numbers
 from syncrelay.recordings.bag.bindings import GroupBinding
 from syncrelay.recordings.bag.columns import (
     Batch,
@@ -44,7 +45,7 @@ class Mapping:
     Without stamps where a relay had mapped them before they were seen.
     """
 
-    stamps: "array[int]" = field(default_factory=lambda: array("q"))
+    stamps: Numbers = field(default_factory=no_numbers)
     steps: tuple[Step, ...] = ()
     rate: float = 0.0
     delay_ns: int = 0
@@ -60,9 +61,9 @@ class Stream:
 
     topic: str
     type: str
-    stamps: "array[int]" = field(default_factory=lambda: array("q"))
-    received: "array[int]" = field(default_factory=lambda: array("q"))
-    places: "array[int]" = field(default_factory=lambda: array("q"))
+    stamps: Numbers = field(default_factory=no_numbers)
+    received: Numbers = field(default_factory=no_numbers)
+    places: Numbers = field(default_factory=no_numbers)
     keys: list[Hashable] | None = None
     mapping: Mapping | None = None
     frames: list[str | None] | None = None
@@ -70,7 +71,22 @@ class Stream:
     transforms: RecordedTransforms | None = None
     mapped: dict[int, "Stream"] = field(default_factory=dict)
     """What by_device gave, by the delay: to map takes as long as to match."""
+    rows: Rows = field(default_factory=lambda: Rows(3))
+    """What is read, in the columns of a stream that was `begun`."""
     _read_frame: ReadFrame = field(default_factory=frame_reader)
+
+    @classmethod
+    def begun(cls, topic: str, type_name: str, *, has_keys: bool = False) -> "Stream":
+        """Return a stream to which messages are added as they are read."""
+        rows = Rows(3)
+        columns = (rows.column(0), rows.column(1), rows.column(2))
+        return cls(topic, type_name, *columns, [] if has_keys else None, rows=rows)
+
+    @classmethod
+    def of(cls, topic: str, type_name: str, messages: Sequence[tuple[int, int, int]]) -> "Stream":
+        """Return a stream of some messages: stamp, time of receipt and place."""
+        columns = np.array(messages, dtype=np.int64).reshape(-1, 3)
+        return cls(topic, type_name, columns[:, 0], columns[:, 1], columns[:, 2])
 
     def by_device(self, delay_ns: int) -> "Stream":
         """Give the same messages with their stamps mapped to the host's time, as `clock: device` has it."""
@@ -81,23 +97,24 @@ class Stream:
     def _by_device(self, delay_ns: int) -> "Stream":
         steps: list[Step] = []
         clock = DeviceClock(delay_ns=delay_ns, stepped=steps.append)
-        mapped = array("q", host_times(clock, self.stamps, self.received))
+        mapped = Rows(1)
+        for stamps, at in zip(blocks(self.stamps), blocks(self.received), strict=True):
+            times = host_times(clock, stamps.tolist(), at.tolist())
+            mapped.append(np.fromiter(times, dtype=np.int64).reshape(-1, 1))
         mapping = Mapping(self.stamps, tuple(steps), clock.rate, delay_ns)
-        return replace(self, stamps=mapped, mapping=mapping, mapped={})
+        return replace(self, stamps=mapped.column(0), mapping=mapping, mapped={})
 
     def by_receipt(self) -> "Stream":
         """Give the same messages with the times of receipt for stamps."""
         return replace(self, stamps=self.received, mapping=None, mapped={})
 
-    def numbers(self) -> tuple[Nanoseconds, Nanoseconds, Nanoseconds]:
-        """Give stamps, times of receipt and places as arrays for arithmetic."""
-        return _array(self.stamps), _array(self.received), _array(self.places)
+    def arrays(self) -> tuple[Nanoseconds, Nanoseconds, Nanoseconds]:
+        """Give stamps, times of receipt and places as whole arrays."""
+        return self.stamps[:], self.received[:], self.places[:]
 
     def add(self, column: Column, batch: Batch, begin: int) -> None:
         """Take messages of a batch, which begins at a place of the recording."""
-        self.stamps.frombytes(column.stamps.tobytes())
-        self.received.frombytes(batch.received[column.places].tobytes())
-        self.places.frombytes((column.places + begin).tobytes())
+        self.rows.append(np.stack([column.stamps, batch.received[column.places], column.places + begin], axis=1))
         if self.keys is not None:
             self.keys += column.keys or repeat(None, len(column.places))
         if self.frames is not None:
@@ -125,7 +142,7 @@ def read_streams(recording: Recording, bindings: Sequence[GroupBinding]) -> tupl
             needs_place = binding.group.restamp is not None and topic.stamp != "header"
             wanted = (each.topic, topic.stamp, topic.key, needs_place, awaits)
             if wanted not in streams:
-                streams[wanted] = Stream(each.topic, topic.type or "", keys=None if topic.key is None else [])
+                streams[wanted] = Stream.begun(each.topic, topic.type or "", has_keys=topic.key is not None)
                 if awaits:
                     streams[wanted].frames, streams[wanted].transforms = [], transforms
                 readers = [(channel, column_reader(binding.group, index, channel)) for channel in each.channels]
@@ -151,7 +168,7 @@ def read_topics(recording: Recording) -> tuple[tuple[Channel, Stream], ...]:
     for channel in recording.channels:
         found.setdefault((channel.topic, channel.type, channel.encoding), []).append(channel)
     filled: _Filled = [
-        (Stream(topic, type_name), [(channel, stamp_or_receipt_column(channel)) for channel in channels])
+        (Stream.begun(topic, type_name), [(channel, stamp_or_receipt_column(channel)) for channel in channels])
         for (topic, type_name, _), channels in found.items()
     ]
     _pour(recording, filled)
@@ -160,17 +177,29 @@ def read_topics(recording: Recording) -> tuple[tuple[Channel, Stream], ...]:
 
 def messages(streams: Sequence[Stream]) -> Iterator[Message]:
     """Yield the messages of a group's inputs in the order of the recording; the payload is the time of receipt."""
-    numbers = [stream.numbers() for stream in streams]
-    places = [places for _, _, places in numbers]
+    at = [0] * len(streams)
+    while any(begin < len(stream.places) for begin, stream in zip(at, streams, strict=True)):
+        ends = [begin + _AT_ONCE for begin in at]
+        parts = [stream.places[begin:end] for stream, begin, end in zip(streams, at, ends, strict=True)]
+        # Up to here no later part has an earlier message.
+        rest = [part[-1] for part, end, stream in zip(parts, ends, streams, strict=True) if end < len(stream.places)]
+        until = min(rest, default=None)
+        counts = [len(part) if until is None else int(np.searchsorted(part, until, side="right")) for part in parts]
+        among = [slice(begin, begin + count) for begin, count in zip(at, counts, strict=True)]
+        yield from _merged(streams, among, [part[:count] for part, count in zip(parts, counts, strict=True)])
+        at = [each.stop for each in among]
+
+
+def _merged(streams: Sequence[Stream], among: Sequence[slice], places: Sequence[Nanoseconds]) -> Iterator[Message]:
     order, inputs = in_order(places)
-    stamps, received = (np.concatenate([each[column] for each in numbers])[order] for column in (0, 1))
-    keys = iter(keys_in_order([(stream.keys, len(stream.places)) for stream in streams], order) or repeat(None))
-    frames: Iterator[Any] = iter(
-        keys_in_order([(stream.frames, len(stream.places)) for stream in streams], order) or repeat(None)
-    )
-    for begin in range(0, len(order), _AT_ONCE):
-        among = slice(begin, begin + _AT_ONCE)
-        yield from map(Message, inputs[among].tolist(), stamps[among].tolist(), received[among].tolist(), keys, frames)
+    parts = list(zip(streams, among, places, strict=True))
+    stamps = np.concatenate([stream.stamps[part] for stream, part, _ in parts])[order].tolist()
+    received = np.concatenate([stream.received[part] for stream, part, _ in parts])[order].tolist()
+    keys = keys_in_order([(stream.keys and stream.keys[part], len(at)) for stream, part, at in parts], order)
+    frames: Any = keys_in_order([(stream.frames and stream.frames[part], len(at)) for stream, part, at in parts], order)
+    if keys is None and frames is None:
+        return map(Message, inputs.tolist(), stamps, received)
+    return map(Message, inputs.tolist(), stamps, received, keys or repeat(None), frames or repeat(None))
 
 
 def transforms_beside(streams: Sequence[Stream]) -> RecordedTransforms | None:
@@ -203,7 +232,3 @@ def _pour(recording: Recording, filled: _Filled, transforms: RecordedTransforms 
                 for raw in map(batch.rows.__getitem__, column.places.tolist()):
                     transforms.add(reader.read(raw), raw[1])
         begin += len(batch.rows)
-
-
-def _array(values: "array[int]") -> Nanoseconds:
-    return np.frombuffer(values, dtype=np.int64) if values else np.zeros(0, dtype=np.int64)

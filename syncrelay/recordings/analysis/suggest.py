@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from statistics import median
 from typing import Final
+
+import numpy as np
 
 from syncrelay.config import GroupConfig
 from syncrelay.config.units import parse_duration
@@ -14,6 +15,7 @@ from syncrelay.explain.changes import Changes
 from syncrelay.explain.epochs import BOOT_NS
 from syncrelay.explain.nearest import Received, quantile
 from syncrelay.explain.other_stamps import by_offset_of_clock, by_other_stamps, if_delay_is_known, wandering
+from syncrelay.explain.rows import Column
 from syncrelay.explain.rules_transforms import enough_wait
 from syncrelay.explain.trials import Trials
 from syncrelay.recordings.analysis.changes import Change
@@ -44,10 +46,14 @@ class Suggestion:
     then: int
 
 
-def trials_of(group: GroupConfig, streams: Sequence[Stream]) -> Trials:
-    """Return trials of a group on a whole recording."""
-    inputs = tuple(Received(*stream.numbers()) for stream in streams)
-    return Trials(group, lambda: messages(streams), inputs, is_window=False)
+def trials_of(group: GroupConfig, streams: Sequence[Stream], evaluation: Evaluation | None = None) -> Trials:
+    """Return trials of a group on a whole recording, of which there may be an evaluation already."""
+    inputs = tuple(Received(*stream.arrays()) for stream in streams)
+    # Trials thin nothing, wait for no transforms, and go by ticks, which an evaluation does not keep.
+    options = group.options
+    is_alike = options.every == 1 and not options.max_rate and options.transforms is None and group.ticks is None
+    sets = evaluation.sets.rows.blocks if evaluation is not None and is_alike else None
+    return Trials(group, lambda: messages(streams), inputs, is_window=False, sets=sets)
 
 
 def suggest(
@@ -91,16 +97,17 @@ def _matching(
         base = changed(stamping)
         by_base = trials_of(base, stamped(base, streams))
         now = min(len(by_base.spans()), len(evaluation.sets))
-        found = _suggested(by_base, stamped(base, streams), changed, stamping, now=now)
+        found = _suggested(by_base, stamped(base, streams), evaluation, changed, stamping, now=now)
         # What comes seconds late looks like a clock that is off.
         if found.then > trials.given(()):
             return found
-    return _suggested(trials, streams, changed, [], now=trials.given(()))
+    return _suggested(trials, streams, evaluation, changed, [], now=trials.given(()))
 
 
 def _suggested(
     trials: Trials,
     streams: Sequence[Stream],
+    evaluation: Evaluation,
     changed: Callable[[Sequence[Change]], GroupConfig],
     stamping: Sequence[Change],
     *,
@@ -108,13 +115,14 @@ def _suggested(
 ) -> Suggestion:
     possible = trials.possible()
     if possible is None:
-        missing = [stream.topic for stream in streams if not stream.stamps]
+        missing = [stream.topic for stream in streams if not len(stream.stamps)]
         return Suggestion((), (f"no values to suggest: no messages of {', '.join(missing)}",), 0, 0, 0)
     # What was measured takes the place of what stood until then.
     planned, then = [_as_change(each, trials) for each in trials.plan], trials.given(trials.plan)
     changes = list({(each.topic, each.key): each for each in (*stamping, *planned)}.values())
     if sooner := list(_periods(changed(changes), streams)):
-        slow, quick = (evaluate(changed(each), streams) for each in (changes, [*changes, *sooner]))
+        slow = evaluate(changed(changes), streams) if changes else evaluation
+        quick = evaluate(changed([*changes, *sooner]), streams)
         if _is_sooner(quick, slow):
             reason = f"sets leave {words.duration(_latency(slow) - _latency(quick))} sooner"
             changes += [replace(each, reason=reason) for each in sooner]
@@ -224,14 +232,18 @@ def _lower_bound(figures: TopicFigures) -> str | None:
 def _is_sooner(quick: Evaluation, slow: Evaluation) -> bool:
     if len(quick.sets) < len(slow.sets) or not slow.sets:
         return False
-    spans = [median(each.span for each in evaluation.sets) for evaluation in (quick, slow)]
+    spans = [_median(evaluation.sets.spans) for evaluation in (quick, slow)]
     gain = _latency(slow) - _latency(quick)
     # The last sets, which only one of the two has, move the median a little.
     return spans[0] <= _SAME_SPAN * spans[1] and gain >= max(_MS, _latency(slow) / 10)
 
 
 def _latency(evaluation: Evaluation) -> float:
-    return median(each.latency for each in evaluation.sets)
+    return _median(evaluation.sets.latencies)
+
+
+def _median(values: Column) -> float:
+    return float(np.median(values[:]))
 
 
 def _hint(group: GroupConfig, pivot: int, offset: TriedChange) -> str:

@@ -57,7 +57,7 @@ class TopicFigures:
 
 def figures_of(stream: Stream) -> TopicFigures:
     """Return the figures of a topic's stream."""
-    stamps, received, _ = stream.numbers()
+    stamps, received, _ = stream.arrays()
     unstamped = int(np.count_nonzero(stamps == 0))
     is_set = (stamps != 0) & (stamps != UNREADABLE)
     stamped, at = stamps[is_set], received[is_set]

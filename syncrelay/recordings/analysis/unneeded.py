@@ -1,7 +1,7 @@
 """Where the messages of each input went, and which dropped ones cost no set: no partner was left for them."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from syncrelay.config import GroupConfig
-from syncrelay.explain import FOR_WANT_OF_A_PARTNER
+from syncrelay.explain import FOR_WANT_OF_A_PARTNER, UNREADABLE
 from syncrelay.explain.nearest import shifted
-from syncrelay.recordings.analysis.evaluation import Evaluation
+from syncrelay.recordings.analysis.evaluation import REASONS, Evaluation, numbers_of
 from syncrelay.recordings.bag.columns import Nanoseconds
 from syncrelay.sync import DropReason
 
@@ -52,11 +52,21 @@ def input_fates(group: GroupConfig, evaluation: Evaluation, unneeded: Unneeded) 
     """Return where the messages of each input went."""
     without_cost: Counter[int] = Counter()
     costly: list[Counter[DropReason]] = [Counter() for _ in group.topics]
-    for drop, is_unneeded in zip(evaluation.drops, unneeded.flags.tolist(), strict=True):
-        if is_unneeded:
-            without_cost[drop.input] += 1
-        else:
-            costly[drop.input][drop.reason] += 1
+    begin = 0
+    for rows in evaluation.drops.rows.blocks():
+        flags = unneeded.flags[begin : begin + len(rows)]
+        begin += len(rows)
+        kinds, first, counts = np.unique(
+            2 * (rows[:, 0] * len(REASONS) + rows[:, 3]) + flags, return_index=True, return_counts=True
+        )
+        # Those that are equally many stand in the order in which they first occurred.
+        for at in np.argsort(first).tolist():
+            of, is_unneeded = divmod(int(kinds[at]), 2)
+            index, number = divmod(of, len(REASONS))
+            if is_unneeded:
+                without_cost[index] += int(counts[at])
+            else:
+                costly[index][REASONS[number]] += int(counts[at])
     topics = [topic.topic for topic in group.topics]
     return tuple(
         InputFates(
@@ -79,21 +89,17 @@ def find_unneeded(group: GroupConfig, evaluation: Evaluation, reach: int | None)
     input, or there is none. `reach` is the span of the widest possible set; None where possible sets are not known:
     then no message is called unneeded. But where a clock makes the sets, each message is that gave way to a newer one.
     """
-    drops = evaluation.drops
-    gave_way = [group.ticks is not None and drop.reason is DropReason.SUPERSEDED for drop in drops]
-    flags = np.array(gave_way, dtype=np.bool_)
+    of, stamps, _, reasons = evaluation.drops.rows[:].T
+    flags = np.isin(reasons, numbers_of([DropReason.SUPERSEDED] if group.ticks is not None else []))
     lacking: list[tuple[int, ...]] = [() for _ in group.topics]
     if reach is None:
         return Unneeded(flags, tuple(lacking))
     needed = group.enough([counts.fed for counts in evaluation.counts])
     for index in range(len(group.topics)):
-        places = np.array(
-            [at for at, drop in enumerate(drops) if drop.input == index and drop.reason in FOR_WANT_OF_A_PARTNER],
-            dtype=np.int64,
-        )
-        stamps = _stamps(group, index, [drops[at].stamp for at in places.tolist()])
+        places = np.flatnonzero((of == index) & np.isin(reasons, numbers_of(FOR_WANT_OF_A_PARTNER)))
+        wanting = shifted(stamps[places], group.topics[index].offset_ns)
         others = [each for each in needed if each != index]
-        lacks = {each: ~_has_near(stamps, _left_over(group, evaluation, each, index), reach) for each in others}
+        lacks = {each: ~_has_near(wanting, _left_over(group, evaluation, each, index), reach) for each in others}
         if not lacks:
             continue
         is_unneeded = np.any(np.stack(list(lacks.values())), axis=0)
@@ -104,14 +110,10 @@ def find_unneeded(group: GroupConfig, evaluation: Evaluation, reach: int | None)
 
 def _left_over(group: GroupConfig, evaluation: Evaluation, index: int, wanting: int) -> Nanoseconds:
     """Return the stamps, sorted, of an input's messages that are in no set with a message of the wanting input."""
-    dropped = [drop.stamp for drop in evaluation.drops if drop.input == index and drop.reason not in _NO_PARTNER]
-    without = (each.stamps[index] for each in evaluation.sets if each.stamps[wanting] is None)
-    left = [*dropped, *(stamp for stamp in without if stamp is not None)]
-    return np.sort(_stamps(group, index, left))
-
-
-def _stamps(group: GroupConfig, index: int, stamps: Sequence[int]) -> Nanoseconds:
-    return shifted(np.array(stamps, dtype=np.int64), group.topics[index].offset_ns)
+    drops, sets = evaluation.drops.rows[:].T, evaluation.sets.rows[:].T
+    dropped = drops[1, (drops[0] == index) & ~np.isin(drops[3], numbers_of(_NO_PARTNER))]
+    without = sets[index, (sets[wanting] == UNREADABLE) & (sets[index] != UNREADABLE)]
+    return np.sort(shifted(np.concatenate([dropped, without]), group.topics[index].offset_ns))
 
 
 def _has_near(stamps: Nanoseconds, others: Nanoseconds, reach: int) -> _Flags:

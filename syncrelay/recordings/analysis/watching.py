@@ -17,9 +17,8 @@ from syncrelay.explain import (
     Severity,
 )
 from syncrelay.explain.trials import Trials
-from syncrelay.recordings.analysis.evaluation import Outcomes
 from syncrelay.recordings.analysis.streams import Stream, messages, transforms_beside
-from syncrelay.sync import Message
+from syncrelay.sync import Match, Message, Outcome
 
 _SECOND: Final = 1_000_000_000
 # The start and the end of a recording bring findings that last less long.
@@ -85,8 +84,8 @@ class _Watch:
     def __init__(
         self, group: GroupConfig, streams: Sequence[Stream], *, began: int, whole: Callable[[], Trials] | None
     ) -> None:
-        self._outcomes = Outcomes(group)
-        self._driver = EngineDriver(group, self._outcomes.take, transforms_beside(streams))
+        self._sets: list[tuple[tuple[int | None, ...], int]] = []
+        self._driver = EngineDriver(group, self._take, transforms_beside(streams))
         self._watch = GroupWatch(group, began=began, whole=whole)
         self._judge_of = Judge()
         self._due = began + _SECOND
@@ -94,6 +93,12 @@ class _Watch:
         self._keys: list[Hashable] = [None] * len(streams)
         self._found: dict[tuple[Code, int | None], LastingFinding] = {}
         self._graph = [_graph(topic, stream) for topic, stream in zip(group.topics, streams, strict=True)]
+
+    def _take(self, outcomes: Sequence[Outcome], now: int) -> None:
+        for each in outcomes:
+            if isinstance(each, Match):
+                complete = max([message.payload for message in each.messages if message is not None])
+                self._sets.append((each.stamps, now - complete))
 
     def _judge_until(self, now: int) -> None:
         """Judge the seconds that end by `now`."""
@@ -127,12 +132,9 @@ class _Watch:
 
     def _judge(self, now: int, *, lasting: int) -> None:
         self._driver.expire(now)
-        engine, sets = self._driver.engine, self._outcomes.sets
-        left = [(each.stamps, each.latency) for each in sets]
-        self._watch.add(self._arrivals, left, engine.counts(), engine.sets, keys=tuple(self._keys), now=now)
-        self._arrivals = [[] for _ in self._arrivals]
-        sets.clear()
-        self._outcomes.drops.clear()
+        engine = self._driver.engine
+        self._watch.add(self._arrivals, self._sets, engine.counts(), engine.sets, keys=tuple(self._keys), now=now)
+        self._arrivals, self._sets = [[] for _ in self._arrivals], []
         for finding in self._judge_of.judge(
             self._watch.facts(self._graph, now=now, is_recorded=True, lapses=tuple(engine.lapses))
         ):
@@ -143,5 +145,5 @@ class _Watch:
 
 def _graph(topic: TopicConfig, stream: Stream) -> InputGraph:
     """Return what a recording shows around an input: that it was published."""
-    publisher = Endpoint("its publisher", stream.type) if stream.places else None
+    publisher = Endpoint("its publisher", stream.type) if len(stream.places) else None
     return InputGraph(topic.topic, topic.output, (publisher,) if publisher else (), type_from=publisher)

@@ -179,7 +179,7 @@ def _compared(loaded: LoadedCase, group: GroupConfig, found: Sequence[Stream], e
     Raises SyncRelayError where what is expected could not fail.
     """
     expect, path = loaded.case.expect, ("cases", loaded.name, "expect")
-    heard = [stream.received for stream in found if stream.received]
+    heard = [stream.received for stream in found if len(stream.received)]
     if not heard and (expect is None or expect.received is None):
         raise SyncRelayError(
             "no message came to the group, so nothing is tested: if none should come, expect `received: 0`"
@@ -192,8 +192,8 @@ def _compared(loaded: LoadedCase, group: GroupConfig, found: Sequence[Stream], e
         index = loaded.places[name]
         yield from _of_bounds(of_input, _input_figures(evaluation, [index], index), (*path, "inputs", name))
     if expect.findings is not None:
-        began = min((received[0] for received in heard), default=end)
-        lasts = max([end, *(received[-1] for received in heard)]) - began
+        began = min((int(received[0]) for received in heard), default=end)
+        lasts = max([end, *(int(received[-1]) for received in heard)]) - began
         if lasts < LASTING_NS:
             raise SyncRelayError(
                 f"the messages of this case last {lasts / 1e9:.3g} s, so they cannot test `findings`, which are what"
@@ -231,8 +231,8 @@ def _figures(group: GroupConfig, evaluation: Evaluation) -> _Figures:
     counts = evaluation.counts
     fed = [each.fed for each in counts]
     rarest = min(group.enough(fed), key=fed.__getitem__) if group.trigger is None else group.trigger
-    spans = Distribution([each.span for each in evaluation.sets])
-    latencies = Distribution([each.latency for each in evaluation.sets])
+    spans = Distribution(evaluation.sets.spans[:].tolist())
+    latencies = Distribution(evaluation.sets.latencies[:].tolist())
     return {
         **_input_figures(evaluation, range(len(counts)), rarest),
         "sets": Decimal(len(evaluation.sets)),

@@ -1,6 +1,7 @@
 """The messages of a drawn or simulated case, in order of receipt."""
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from itertools import takewhile
 from typing import Final, NamedTuple
@@ -52,17 +53,15 @@ def arrivals(
 
 def streams(received: Sequence[Arrival], group: GroupConfig) -> tuple[Stream, ...]:
     """Return the messages as the analysis takes them: a stream for each input."""
-    made = tuple(
-        Stream(topic.topic, topic.type or "", keys=None if topic.key is None else []) for topic in group.topics
-    )
+    came: list[list[tuple[int, int, int]]] = [[] for _ in group.topics]
+    keys: list[list[Hashable]] = [[] for _ in group.topics]
     for place, each in enumerate(received):
-        stream = made[each.input]
-        stream.stamps.append(each.stamp)
-        stream.received.append(each.received)
-        stream.places.append(place)
-        if stream.keys is not None:
-            stream.keys.append(each.key)
-    return made
+        came[each.input].append((each.stamp, each.received, place))
+        keys[each.input].append(each.key)
+    return tuple(
+        replace(Stream.of(topic.topic, topic.type or "", came[at]), keys=None if topic.key is None else keys[at])
+        for at, topic in enumerate(group.topics)
+    )
 
 
 def _drawn(

@@ -8,6 +8,7 @@ from datetime import UTC, datetime, timedelta
 from math import ceil
 from typing import Annotated, Final
 
+import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 
 from syncrelay import own_version
@@ -192,7 +193,7 @@ def rows_of(
     told = tuple(problems)
     for each in analysis.groups:
         suggestion, sets = each.suggestion, each.evaluation.sets
-        spans, latencies = sorted(one.span for one in sets), sorted(one.latency for one in sets)
+        spans, latencies = (np.sort(each[:]).tolist() for each in (sets.spans, sets.latencies))
         yield FleetRow(
             recording=recording,
             day=_day_of(analysis.begin),
@@ -239,7 +240,6 @@ def _ms(nanoseconds: int | None) -> float | None:
 
 
 def _quantile_ms(ordered: list[int], share: float) -> float | None:
-    # Spans of stamps that make no sense may be longer than any integer of numpy.
     return ordered[ceil(share * len(ordered)) - 1] / _MS if ordered else None
 
 
@@ -258,8 +258,8 @@ def _inputs(each: GroupAnalysis, topics: dict[str, TopicFigures], begin: int) ->
             dropped=tuple(Drops(reason=reason.value, messages=count) for reason, count in counts.dropped.items()),
             rate_hz=figures.rate_hz,
             jitter_ms=_ms(figures.jitter),
-            first_s=(stream.received[0] - begin) / _SECOND if stream.received else None,
-            last_s=(stream.received[-1] - begin) / _SECOND if stream.received else None,
+            first_s=(int(stream.received[0]) - begin) / _SECOND if len(stream.received) else None,
+            last_s=(int(stream.received[-1]) - begin) / _SECOND if len(stream.received) else None,
             gaps=figures.gaps,
             longest_gap_ms=_ms(figures.longest_gap),
             duplicates=figures.duplicates,

@@ -2,9 +2,9 @@
 
 import random
 import re
-from array import array
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -32,11 +32,11 @@ def streams_of(*topics, latency=5 * MS, late=0):
         for index, stamps in enumerate(topics)
         for stamp in stamps
     )
-    streams = [Stream(f"/{'abcdef'[index]}", VECTOR) for index in range(len(topics))]
-    for place, (received, index, stamp) in enumerate(came):
-        for values, value in (("stamps", stamp), ("received", received), ("places", place)):
-            getattr(streams[index], values).append(value)
-    return streams
+    rows = [(index, (stamp, received, place)) for place, (received, index, stamp) in enumerate(came)]
+    return [
+        Stream.of(f"/{'abcdef'[index]}", VECTOR, [row for at, row in rows if at == index])
+        for index in range(len(topics))
+    ]
 
 
 def every(period, count, *, phase=0, jitter=0, seed=1):
@@ -60,15 +60,13 @@ def test_the_rhythm_of_a_topic_is_measured():
 
 
 def test_faults_of_stamps_are_counted():
-    values = array("q", [100, 200, 200, 150, 0, UNREADABLE, 300])
-    places = array("q", range(7))
-    figures = figures_of(Stream("/a", VECTOR, values, array("q", range(1000, 1700, 100)), places))
+    values = [100, 200, 200, 150, 0, UNREADABLE, 300]
+    figures = figures_of(Stream.of("/a", VECTOR, [*zip(values, range(1000, 1700, 100), range(7), strict=True)]))
     assert (figures.duplicates, figures.out_of_order, figures.unstamped, figures.unreadable) == (1, 1, 1, 1)
 
 
 def test_a_topic_without_stamps_has_its_rhythm_by_arrival_and_no_delay():
-    zeros = array("q", [0] * 50)
-    figures = figures_of(Stream("/a", VECTOR, zeros, array("q", every(20 * MS, 50)), array("q", range(50))))
+    figures = figures_of(Stream.of("/a", VECTOR, [(0, at, place) for place, at in enumerate(every(20 * MS, 50))]))
     assert (figures.period, figures.rate_hz, figures.delay, figures.unstamped) == (20 * MS, 50.0, None, 50)
 
 
@@ -77,7 +75,7 @@ def test_drift_is_measured_in_parts_per_million(ppm):
     stamps = every(50 * MS, 2000)
     chance = random.Random(1)
     received = [stamp + 5 * MS + (stamp - BEGIN) * ppm // 1_000_000 + round(chance.uniform(0, MS)) for stamp in stamps]
-    stream = Stream("/a", VECTOR, array("q", stamps), array("q", received), array("q", range(2000)))
+    stream = Stream.of("/a", VECTOR, [*zip(stamps, received, range(2000), strict=True)])
     found = figures_of(stream).drift_ppm
     assert found == pytest.approx(ppm, abs=5) if ppm else found is None or abs(found) < 5
 
@@ -207,7 +205,7 @@ def test_a_device_is_offered_to_be_mapped_where_that_brings_the_sets_of_a_clock_
         topics[1].update(device)
         group = {"policy": "latest_time", "trigger": "37 Hz", "max_age": max_age, "topics": topics}
         streams = streams_of(every(20 * MS, 2000), every(100 * MS, 400, jitter=MS))
-        streams[1].stamps[:] = array("q", [stamp - 7200 * _SECOND for stamp in streams[1].stamps])
+        streams[1].stamps[:] -= 7200 * _SECOND
         text = config({"front": group})
         return _analyzed(stamped(group_of(text, "front"), streams), text)
 
@@ -244,8 +242,8 @@ def test_a_pause_is_found_for_as_long_as_it_lasts(pause):
 def test_one_message_of_1970_does_not_keep_the_others_from_being_judged():
     stamps = every(100 * MS, 300)
     (first, second) = streams_of(stamps, [stamp + 30 * MS for stamp in stamps])
-    for values, value in ((first.stamps, stamps[0] - MS), (first.received, 5 * _SECOND), (first.places, -1)):
-        values.insert(0, value)
+    rows = np.stack(first.arrays(), axis=1).tolist()
+    first = Stream.of(first.topic, VECTOR, [(stamps[0] - MS, 5 * _SECOND, -1), *rows])
     assert 20 < _watched([first, second])["over_slop", None] <= 30
 
 

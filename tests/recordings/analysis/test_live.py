@@ -21,7 +21,7 @@ def test_messages_are_in_the_order_of_their_arrival():
     live = LiveStreams(read.groups)
     _heard(live, "front", first=0, count=3)
     camera, lidar = live.streams(read.groups[0])
-    assert (list(camera.places), list(lidar.places)) == ([0, 2, 4], [1, 3, 5])
+    assert (camera.places[:].tolist(), lidar.places[:].tolist()) == ([0, 2, 4], [1, 3, 5])
 
 
 def test_only_the_last_messages_are_kept():

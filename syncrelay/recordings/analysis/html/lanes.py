@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from syncrelay.explain import UNREADABLE
 from syncrelay.recordings.analysis import GroupAnalysis
+from syncrelay.recordings.analysis.evaluation import REASONS
 from syncrelay.recordings.bag.columns import Nanoseconds
 from syncrelay.status.fates import CODES, MATCHED, UNNEEDED
 
@@ -19,7 +20,6 @@ _ASTRAY: Final = 2 * _SECOND
 _NONE: Final = -1
 # Sums of it with any time of receipt and any stamp fit 64 bits.
 _LARGEST_OFFSET: Final = 2**61
-_LONGEST: Final = 2**63 - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,13 +55,12 @@ def lanes_of(group: GroupAnalysis, begin: int, *, most: int) -> Lanes:
     delay = _usual_delay(group)
     origin = begin - delay
     sets = group.evaluation.sets
-    n_inputs = len(group.streams)
-    missing = np.array([[stamp is None for stamp in each.stamps] for each in sets], dtype=bool).reshape(-1, n_inputs)
-    stamps = np.array([[stamp or 0 for stamp in each.stamps] for each in sets], dtype=np.int64).reshape(-1, n_inputs)
+    stamps = sets.rows[:][:, : sets.n_inputs]
+    missing = stamps == UNREADABLE
     offsets = _offsets(group)
-    times = stamps + np.array(offsets, dtype=np.int64) - origin
+    times = np.where(missing, 0, stamps) + np.array(offsets, dtype=np.int64) - origin
     latest = np.max(np.where(missing, np.iinfo(np.int64).min, times), axis=1, initial=np.iinfo(np.int64).min)
-    complete = np.array([each.left - each.latency for each in sets], dtype=np.int64) - begin
+    complete = sets.left[:] - sets.latencies[:] - begin
     is_astray = np.abs(latest - complete) > _ASTRAY
     times = np.where(is_astray[:, None], times - latest[:, None] + complete[:, None], times)
 
@@ -89,8 +88,8 @@ def lanes_of(group: GroupAnalysis, begin: int, *, most: int) -> Lanes:
         lanes=tuple(lanes),
         members=np.stack(places, axis=1)[by_begin],
         begins=begins[by_begin],
-        spans=np.array([min(each.span, _LONGEST) for each in sets], dtype=np.int64)[by_begin],
-        latencies=np.array([min(each.latency, _LONGEST) for each in sets], dtype=np.int64)[by_begin],
+        spans=sets.spans[:][by_begin],
+        latencies=sets.latencies[:][by_begin],
         astray=astray,
         each=1,
     )
@@ -107,7 +106,7 @@ def _usual_delay(group: GroupAnalysis) -> int:
     """Return how long after its stamp, offset included, a message was usually received."""
     delays = []
     for offset, stream in zip(_offsets(group), group.streams, strict=True):
-        stamps, received, _ = stream.numbers()
+        stamps, received, _ = stream.arrays()
         is_set = (stamps != 0) & (stamps != UNREADABLE)
         delays.append(received[is_set] - stamps[is_set] - offset)
     every = np.concatenate(delays)
@@ -121,15 +120,13 @@ def _offsets(group: GroupAnalysis) -> list[int]:
 
 def _dropped(group: GroupAnalysis, index: int, origin: int, begin: int) -> tuple[Nanoseconds, Nanoseconds, int]:
     """Return when the dropped messages of an input were made, the codes of their fates, and how many are astray."""
-    rows = zip(group.evaluation.drops, group.unneeded.flags.tolist(), strict=True)
-    of_input = [(drop, is_unneeded) for drop, is_unneeded in rows if drop.input == index]
-    drops = [drop for drop, _ in of_input]
-    stamps = np.array([each.stamp for each in drops], dtype=np.int64)
-    received = np.array([each.received for each in drops], dtype=np.int64)
+    rows = group.evaluation.drops.rows[:]
+    of_input = rows[:, 0] == index
+    _, stamps, received, reasons = rows[of_input].T
     times = stamps - origin
     is_astray = (stamps == 0) | (np.abs(times - received + begin) > _ASTRAY)
-    codes = np.array([CODES[each.reason.value] for each in drops], dtype=np.int64)
-    codes[np.array([is_unneeded for _, is_unneeded in of_input], dtype=bool)] = CODES[UNNEEDED]
+    codes = np.array([CODES[reason.value] for reason in REASONS], dtype=np.int64)[reasons]
+    codes[group.unneeded.flags[of_input]] = CODES[UNNEEDED]
     return np.where(is_astray, received - begin, times), codes, int(np.count_nonzero(is_astray))
 
 

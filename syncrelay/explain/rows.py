@@ -1,0 +1,137 @@
+"""Rows of numbers, as many as a long recording gives: the first are in memory, all after these in a temporary file."""
+
+import os
+import tempfile
+from collections.abc import Iterator
+from typing import IO, Final, Protocol, TypeAlias, overload
+
+import numpy as np
+import numpy.typing as npt
+
+Numbers: TypeAlias = npt.NDArray[np.int64]
+
+BLOCK: Final = 1 << 14
+"""So many rows are kept, and worked on, at a time."""
+
+# So many bytes stay in memory: most recordings need no file.
+_IN_MEMORY: Final = 4_000_000
+_BYTES: Final = 8
+
+
+class Column(Protocol):
+    """Numbers that are read in stretches; an array is one."""
+
+    def __len__(self) -> int: ...
+
+    @overload
+    def __getitem__(self, at: int, /) -> int: ...
+    @overload
+    def __getitem__(self, at: slice, /) -> Numbers: ...
+
+
+def blocks(column: Column, size: int = BLOCK) -> Iterator[Numbers]:
+    """Yield the numbers of a column in order, in arrays of up to `size`."""
+    for begin in range(0, len(column), size):
+        yield column[begin : begin + size]
+
+
+def no_numbers() -> Column:
+    """Return a column without numbers."""
+    return np.zeros(0, dtype=np.int64)
+
+
+class Rows:
+    """A table of numbers that grows at its end; `rows[first:after]` reads a stretch of it."""
+
+    def __init__(self, width: int, *, in_memory: int = _IN_MEMORY) -> None:
+        """Keep up to so many bytes in memory, and a block more."""
+        self.width: Final = width
+        self._in_memory = in_memory
+        self._blocks: list[Numbers] = []
+        self._file: IO[bytes] | None = None
+        self._last: list[Numbers] = []
+        self._in_last = 0
+        self._in_blocks = 0
+
+    def append(self, rows: Numbers) -> None:
+        """Add rows at the end."""
+        if not len(rows):
+            return
+        self._last.append(rows)
+        self._in_last += len(rows)
+        if self._in_last >= BLOCK:
+            joined = np.concatenate(self._last)
+            whole = self._in_last - self._in_last % BLOCK
+            for begin in range(0, whole, BLOCK):
+                self._keep(joined[begin : begin + BLOCK])
+            self._in_last -= whole
+            # A copy, so that the rest is not held.
+            self._last = [joined[whole:].copy()]
+
+    def _keep(self, block: Numbers) -> None:
+        self._in_blocks += BLOCK
+        if (len(self._blocks) + 1) * block.size * _BYTES <= self._in_memory:
+            self._blocks.append(block.copy())
+            return
+        if self._file is None:
+            self._file = tempfile.TemporaryFile()  # noqa: SIM115  closed by __del__
+        self._file.write(block.tobytes())
+        self._file.flush()
+
+    def __del__(self) -> None:
+        if self._file is not None:
+            self._file.close()
+
+    def __len__(self) -> int:
+        return self._in_blocks + self._in_last
+
+    def __getitem__(self, among: slice) -> Numbers:
+        first, after, _ = among.indices(len(self))
+        held = len(self._blocks) * BLOCK
+        parts = [
+            self._blocks[begin // BLOCK][max(0, first - begin) : after - begin]
+            for begin in range(first - first % BLOCK, min(after, held), BLOCK)
+        ]
+        if (begin := max(first, held)) < (end := min(after, self._in_blocks)):
+            parts.append(self._read(begin - held, end - begin))
+        if after > self._in_blocks:
+            if len(self._last) > 1:
+                self._last = [np.concatenate(self._last)]
+            parts.append(self._last[0][max(0, first - self._in_blocks) : after - self._in_blocks])
+        if not parts:
+            return np.zeros((0, self.width), dtype=np.int64)
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    def _read(self, place: int, count: int) -> Numbers:
+        assert self._file is not None  # noqa: S101  there are blocks after those in memory
+        size = self.width * _BYTES
+        content = os.pread(self._file.fileno(), count * size, place * size)
+        return np.frombuffer(content, dtype=np.int64).reshape(-1, self.width)
+
+    def blocks(self) -> Iterator[Numbers]:
+        """Yield all rows in order, many at a time."""
+        for begin in range(0, len(self), BLOCK):
+            yield self[begin : begin + BLOCK]
+
+    def column(self, place: int) -> Column:
+        """Return one column, as long as the table is whenever it is asked."""
+        return _ColumnOf(self, place)
+
+
+class _ColumnOf:
+    def __init__(self, rows: Rows, place: int) -> None:
+        self._rows = rows
+        self._place = place
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    @overload
+    def __getitem__(self, at: int) -> int: ...
+    @overload
+    def __getitem__(self, at: slice) -> Numbers: ...
+    def __getitem__(self, at: int | slice) -> int | Numbers:
+        if isinstance(at, slice):
+            return self._rows[at][:, self._place]
+        at = range(len(self))[at]
+        return int(self._rows[at : at + 1][0, self._place])

@@ -1,0 +1,27 @@
+"""Rows of numbers are what was appended, whichever of them are in memory and whichever in the file."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from syncrelay.explain.rows import BLOCK, Rows, blocks
+
+_SIZES = st.integers(0, 3 * BLOCK)
+
+
+@given(sizes=st.lists(_SIZES, max_size=5), width=st.integers(1, 3), ends=st.tuples(st.integers(), st.integers()))
+def test_any_stretch_is_what_was_appended(sizes, width, ends):
+    whole = np.arange(width * sum(sizes), dtype=np.int64).reshape(-1, width)
+    kept = Rows(width, in_memory=BLOCK * width * 8 * 2)
+    begin = 0
+    for size in sizes:
+        kept.append(whole[begin : begin + size])
+        begin += size
+    assert len(kept) == len(whole)
+    first, after = (end % (len(whole) + 1) for end in ends)
+    assert np.array_equal(kept[first:after], whole[first:after])
+    assert np.array_equal(np.concatenate([*kept.blocks(), whole[:0]]), whole)
+    column = kept.column(width - 1)
+    assert np.array_equal(np.concatenate([*blocks(column), whole[:0, 0]]), whole[:, -1])
+    if len(whole):
+        assert (column[0], column[-1], column[len(whole) // 2]) == tuple(whole[[0, -1, len(whole) // 2], -1].tolist())
