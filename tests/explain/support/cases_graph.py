@@ -31,11 +31,14 @@ FOUND = {
     ),
     "bundles whose package is not there, and nothing else leaves": a_group(
         unbundled=Unbundled(
-            Refusal("publish", "/set", "rig_msgs/msg/Set", why="No module named 'rig_msgs'\nand more"), is_alone=True
+            Refusal("publish", "/set", "rig_msgs/msg/Set", why="No module named 'rig_msgs'\nand more", is_unfit=True),
+            is_alone=True,
         )
     ),
     "bundles that cannot be made, beside the outputs": a_group(
-        unbundled=Unbundled(Refusal("publish", "/set", "rig_msgs/msg/Set", why="rgb is cut off"), is_alone=False)
+        unbundled=Unbundled(
+            Refusal("publish", "/set", "rig_msgs/msg/Set", why="rgb is cut off", is_unfit=True), is_alone=False
+        )
     ),
     "a type that is not installed": a_group(camera(not_importable="no package fancy_msgs\nand more"), LIDAR),
     "a field that the type does not have": a_group(
