@@ -37,6 +37,11 @@ def drawn_type(chance: random.Random) -> tuple[Any, str]:
 
 def drawn_set(chance: random.Random) -> tuple[Any, str]:
     """Return a typestore and a type in it whose fields are messages and arrays of them, between others."""
+    return _store_of(drawn_definitions(chance)), "made_msgs/msg/Set"
+
+
+def drawn_definitions(chance: random.Random) -> dict[str, str]:
+    """Draw the definition of such a type, and of those in it."""
     definitions: dict[str, str] = {}
     lines = []
     for number in range(chance.randint(2, 8)):
@@ -46,7 +51,7 @@ def drawn_set(chance: random.Random) -> tuple[Any, str]:
         else:
             lines.append(f"{chance.choice([*_NUMBERS, 'string'])}{chance.choice(_SHAPES)} f{number}\n")
     definitions["made_msgs/msg/Set"] = "".join(lines)
-    return _store_of(definitions), "made_msgs/msg/Set"
+    return definitions
 
 
 def _store_of(definitions: dict[str, str]) -> Any:
