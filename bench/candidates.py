@@ -76,6 +76,7 @@ class Candidate:
     tap: Sequence[str] = ()
     bundles: Sequence[str] = ()
     """The topics of its bundles, where its sets leave as one message each."""
+    bundle_type: str = "Set"
 
 
 # Scalars on /diagnostics; manifests that someone hears; neither watching nor telling; sets and drops that are tapped;
@@ -95,7 +96,10 @@ class Workshop:
         asked = dict(setting.partition("=")[::2] for setting in settings.split(",") if setting)
         python = asked.pop("PYTHON", sys.executable)
         if kind == "c":
-            return Candidate(word, load, [python, "-c", CALL_MAIN, str(self._built_floor()), *_words(load)], asked)
+            joined = ["joined"] if asked.pop("bundled", None) == "" else []
+            bundles = load.outputs[:1] if joined else []
+            call = [python, "-c", CALL_MAIN, str(self._built_floor()), *joined, *_words(load)]
+            return Candidate(word, load, call, asked, bundles=bundles, bundle_type=load.type_name)
         if kind == "typed":
             here = {"PYTHONPATH": str(HERE.parent)}
             return Candidate(word, load, [python, str(HERE / "typed_relay.py"), *_words(load)], {**here, **asked})

@@ -3,8 +3,8 @@
 A candidate is a checkout of syncrelay (`.`, `/path/to/another`), `c` (bench/floor.c, bare C on rcl) or `typed`
 (bench/typed_relay.py). Settings follow an @, with commas between: environment variables (`.@SYNCRELAY_RECEIVE=rclpy`)
 and the interpreter (`.@PYTHON=/path/to/python`); for a checkout also `coalesce=300us` (as in the file), `heard` (its
-manifest has a subscriber), `scalars` (on /diagnostics), `tapped` (by `syncrelay tap`) and `untold` (it neither watches
-itself nor tells of it).
+manifest has a subscriber), `scalars` (on /diagnostics), `tapped` (by `syncrelay tap`), `untold` (it neither watches
+itself nor tells of it) and `bundled` (each set leaves as one message). `c@bundled` joins the bytes of the messages.
 
 Each is started once, between processes that publish and receive, and all are loaded at once, in rounds of a second. CPU
 is what all threads of its process ran, by the scheduler's count, per message that came out. Rounds in which neighbours

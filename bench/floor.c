@@ -1,6 +1,8 @@
 // The floor: a relay of bytes on rcl alone, which neither matches nor reads anything.
 //
-//     floor TYPE INPUT OUTPUT [TYPE INPUT OUTPUT ...]        TYPE is Image or Imu
+//     floor [joined] TYPE INPUT OUTPUT [TYPE INPUT OUTPUT ...]        TYPE is Image or Imu
+//
+// With `joined`, the bytes of a message from each input leave on the first output in one, once the last input has come.
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -34,8 +36,21 @@ static const rosidl_message_type_support_t * type_of(const char * name)
                                   : ROSIDL_GET_MSG_TYPE_SUPPORT(sensor_msgs, msg, Image);
 }
 
+// Add a message's bytes behind those that are there, into memory that is used again.
+static void append(rcl_serialized_message_t * to, const rcl_serialized_message_t * message)
+{
+  if (to->buffer_capacity < to->buffer_length + message->buffer_length) {
+    require(rmw_serialized_message_resize(to, to->buffer_length + message->buffer_length), "resize");
+  }
+  memcpy(to->buffer + to->buffer_length, message->buffer, message->buffer_length);
+  to->buffer_length += message->buffer_length;
+}
+
 int main(int argc, char ** argv)
 {
+  const int is_joined = argc > 1 && strcmp(argv[1], "joined") == 0;
+  argc -= is_joined;
+  argv += is_joined;
   const size_t count = (size_t)(argc - 1) / 3;
   rcl_allocator_t allocator = rcl_get_default_allocator();
   rcl_init_options_t options = rcl_get_zero_initialized_init_options();
@@ -63,6 +78,8 @@ int main(int argc, char ** argv)
 
   rcl_serialized_message_t message = rmw_get_zero_initialized_serialized_message();
   require(rmw_serialized_message_init(&message, 0, &allocator), "message");
+  rcl_serialized_message_t whole = rmw_get_zero_initialized_serialized_message();
+  require(rmw_serialized_message_init(&whole, 0, &allocator), "message");
   rcl_wait_set_t wait_set = rcl_get_zero_initialized_wait_set();
   require(rcl_wait_set_init(&wait_set, count, 0, 0, 0, 0, 0, &context, allocator), "wait set");
   while (!ended) {
@@ -77,7 +94,15 @@ int main(int argc, char ** argv)
       rmw_message_info_t info;
       while (wait_set.subscriptions[i] &&
              rcl_take_serialized_message(&subscriptions[i], &message, &info, NULL) == RCL_RET_OK) {
-        require(rcl_publish_serialized_message(&publishers[i], &message, NULL), "publish");
+        if (!is_joined) {
+          require(rcl_publish_serialized_message(&publishers[i], &message, NULL), "publish");
+          continue;
+        }
+        append(&whole, &message);
+        if (i == count - 1) {
+          require(rcl_publish_serialized_message(&publishers[0], &whole, NULL), "publish");
+          whole.buffer_length = 0;
+        }
       }
     }
   }

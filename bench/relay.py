@@ -65,7 +65,8 @@ class Tables:
     def bundled(self):
         middle = replace(LOADS["2 x 20 Hz x 1 MB"], size=100_000)
         for name, load in {SMALL: LOADS[SMALL], "2 x 20 Hz x 100 kB": middle, **ONE_MB}.items():
-            self._show(name, [self._workshop.candidate(word, load) for word in (CHECKOUT, f"{CHECKOUT}@bundled")])
+            words = (CHECKOUT, f"{CHECKOUT}@bundled", "c", "c@bundled")
+            self._show(name, [self._workshop.candidate(word, load) for word in words])
 
     def large(self):
         self._loads("large messages", LARGE_LOADS)

@@ -1,7 +1,7 @@
 """The publisher and the receiver around a relay under test, each a process that rounds.py starts.
 
     rig.py publish TYPE --size BYTES --rate HZ --together N --apart SECONDS TOPIC...
-    rig.py receive TYPE --together N [--bundled] [--hear MANIFEST] TOPIC...
+    rig.py receive TYPE --together N [--bundled TYPE] [--hear MANIFEST] TOPIC...
 
 Both say `ready` when DDS has matched them, and then wait for turns on stdin. Stamps are times of publishing by the
 system clock, so that the age of a set's last message, when it comes back, is its latency.
@@ -71,7 +71,7 @@ def receive(node, asked):
     # A bundle counts as its messages, and is a set by itself.
     each, together = (asked.together, 1) if asked.bundled else (1, asked.together)
     if asked.bundled:
-        kind = import_module("bench_msgs.msg").Set
+        kind = TYPES.get(asked.bundled) or import_module("bench_msgs.msg").Set
     subscriptions = [node.create_subscription(kind, topic, print, PROFILE, raw=True) for topic in topics]
     # DDS receives and acknowledges manifests, whether anyone takes them or not.
     heard = [node.create_subscription(DiagnosticArray, topic, print, 500, raw=True) for topic in asked.hear]
@@ -113,7 +113,7 @@ def main():
     parser.add_argument("--rate", type=float)
     parser.add_argument("--together", type=int)
     parser.add_argument("--apart", type=float)
-    parser.add_argument("--bundled", action="store_true")
+    parser.add_argument("--bundled")
     parser.add_argument("--hear", action="append", default=[])
     asked = parser.parse_args()
     rclpy.init()

@@ -90,11 +90,12 @@ class Station:
         hear = [f"--hear={topic}" for topic in candidate.hear]
         relay_environ = {**environ, **candidate.environ}
         self.relay = start(candidate.argv, relay_environ, candidate.folder)
-        sourced = candidate.environ if candidate.bundles else {"PYTHONPATH": str(HERE.parent)}
-        rig_environ = {**environ, **sourced}
+        rig_environ = {**environ, "PYTHONPATH": str(HERE.parent)}
+        if candidate.bundles:
+            rig_environ |= candidate.environ
         self._publisher = start([*rig, "publish", load.type_name, *pace, *load.inputs], rig_environ)
         told = [*rig, "receive", load.type_name, f"--together={load.topics}", *hear]
-        told += ["--bundled", *candidate.bundles] if candidate.bundles else load.outputs
+        told += [f"--bundled={candidate.bundle_type}", *candidate.bundles] if candidate.bundles else load.outputs
         self._receiver = start(told, rig_environ)
         # Once the relay is there.
         self._start_tap = lambda: start(candidate.tap, relay_environ, candidate.folder) if candidate.tap else None
