@@ -249,6 +249,7 @@ class Around(TypedDict, total=False):
     lapses: Sequence[Lapse]
     unbundled: Unbundled | None
     bundle: str | None
+    bundle_subscribers: Sequence[Endpoint]
 
 
 @dataclass(frozen=True, slots=True)
@@ -319,6 +320,8 @@ class GroupFacts:
     """Why its sets do not leave as one message each, where they should."""
     bundle: str | None = None
     """The topic on which its sets leave as one message each, as the graph names it."""
+    bundle_subscribers: Sequence[Endpoint] = ()
+    """Who takes these messages."""
     standing: Standing = Standing.ENOUGH
     """How many of the possible sets leave."""
 

@@ -54,6 +54,8 @@ def refused_by_dds(_facts: GroupFacts, _index: int, an_input: InputFacts) -> Fou
 def _what_helps(refusal: Refusal) -> str:
     if refusal.held_as:
         return "give one of the two another name: a process has one type for each topic"
+    if refusal.is_unfit:
+        return "build its package from the definitions that the publishers use, and source it where the relay runs"
     return "the relay tries again every 5 s; if this goes on, check the limits on memory and open files"
 
 
@@ -61,14 +63,8 @@ def no_bundle(facts: GroupFacts) -> Found:
     """Find that the sets do not leave as one message each, as they should."""
     if facts.unbundled is not None:
         refusal = facts.unbundled.refusal
-        yield Fault(
-            refusal.text.splitlines()[0],
-            "build its package from the definitions that the inputs' publishers use, and source it where the relay"
-            " runs: it tries again every 5 s"
-            if refusal.is_unfit
-            else _what_helps(refusal),
-            Severity.ERROR if facts.unbundled.is_alone else Severity.WARN,
-        )
+        severity = Severity.ERROR if facts.unbundled.is_alone else Severity.WARN
+        yield Fault(refusal.text.splitlines()[0], _what_helps(refusal), severity)
 
 
 def type_not_importable(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
@@ -250,8 +246,8 @@ def nobody_listens(facts: GroupFacts) -> Found:
     """Find that a lazy group sleeps, as it should."""
     if facts.asleep:
         outputs = [each for each in facts.inputs if each.graph.publishers] or facts.inputs
-        names = one_of(each.output for each in outputs)
-        some = any(each.graph.subscribers for each in outputs)
+        names = one_of(dict.fromkeys(filter(None, [*(each.output for each in outputs), facts.bundle])))
+        some = any(each.graph.subscribers for each in outputs) or facts.bundle_subscribers
         who = f"no subscriber of {names} fits what the relay offers" if some else f"nobody subscribes to {names}"
         yield Fault(f"{who}, so this lazy group receives nothing", severity=Severity.OK)
 
@@ -369,14 +365,25 @@ def _or_hold_longer(facts: GroupFacts, index: int) -> str:
     return f"; if it is meant to be sent this rarely, write a `{tolerance.key}` larger than {age} for it"
 
 
-def subscriber_qos(_facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
+def subscriber_qos(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find subscribers of an output that the relay's QoS cannot serve."""
-    for subscriber in an_input.graph.subscribers:
+    if an_input.output != facts.bundle:
+        yield from _unserved(an_input.graph.subscribers, an_input.output, f"{an_input.name}'s publisher")
+
+
+def bundle_subscriber_qos(facts: GroupFacts) -> Found:
+    """Find subscribers of the bundle that the relay's QoS cannot serve."""
+    if facts.bundle is not None:
+        yield from _unserved(facts.bundle_subscribers, facts.bundle, "`qos` of the bundle")
+
+
+def _unserved(subscribers: Sequence[Endpoint], output: str, other: str) -> Found:
+    for subscriber in subscribers:
         if (why := subscriber.mismatch) is not None:
             yield Fault(
-                f"{subscriber.node} requests {an_input.output} with {why.policy} {why.requested}, the relay offers"
+                f"{subscriber.node} requests {output} with {why.policy} {why.requested}, the relay offers"
                 f" {why.offered}, so it gets nothing",
-                f"have {subscriber.node} request {why.offered}, or {an_input.name}'s publisher offer {why.requested}",
+                f"have {subscriber.node} request {why.offered}, or {other} offer {why.requested}",
             )
 
 

@@ -218,6 +218,7 @@ class Monitor:
             lapses=batch.lapses,
             unbundled=self._surroundings.unbundled(binding),
             bundle=self._surroundings.bundle_of(binding),
+            bundle_subscribers=self._surroundings.bundle_subscribers(binding),
         )
         found = judge.judge(facts)
         self._reports[binding.group] = GroupReport(facts, found, batch.last, log)

@@ -33,6 +33,7 @@ class Surroundings:
         self._publishes = purpose is Purpose.RELAY
         self._bindings: frozenset[InputBinding] = frozenset()
         self._around: dict[InputBinding, _Around] = {}
+        self._takers: dict[GroupBinding, tuple[Endpoint, ...]] = {}
         self._rivals_since: dict[InputBinding, int] = {}
         self._relayed: dict[str, bool] = {}
         self._published: dict[str, tuple[tuple[str, ...], Sequence[EndpointInfo]]] | None = None
@@ -46,6 +47,7 @@ class Surroundings:
     def forget(self) -> None:
         """Poll the graph again for each, as it has changed."""
         self._around.clear()
+        self._takers.clear()
         self._relayed.clear()
         self._published = None
 
@@ -131,6 +133,16 @@ class Surroundings:
         """Return the name in the graph of the topic on which the sets of a group leave as bundles, if they do."""
         bundle = binding.group.config.bundle
         return None if bundle is None else self._node.resolve_topic(bundle.topic)
+
+    def bundle_subscribers(self, binding: GroupBinding) -> tuple[Endpoint, ...]:
+        """Return who takes the bundles of a group."""
+        name, profile = self.bundle_of(binding), binding.bundle.profile
+        if name is None or profile is None:
+            return ()
+        takers = self._takers.get(binding)
+        if takers is None:
+            takers = self._takers[binding] = graph.as_subscribers(self._graph.subscribers_of(name), profile)
+        return takers
 
     def unbundled(self, binding: GroupBinding) -> Unbundled | None:
         """Return why the sets of a group do not leave as bundles, where they should."""

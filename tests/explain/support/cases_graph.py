@@ -36,9 +36,7 @@ FOUND = {
         )
     ),
     "bundles that cannot be made, beside the outputs": a_group(
-        unbundled=Unbundled(
-            Refusal("publish", "/set", "rig_msgs/msg/Set", why="rgb is cut off", is_unfit=True), is_alone=False
-        )
+        unbundled=Unbundled(Refusal("publish", "/set", "rig_msgs/msg/Set", why="out of memory"), is_alone=False)
     ),
     "a type that is not installed": a_group(camera(not_importable="no package fancy_msgs\nand more"), LIDAR),
     "a field that the type does not have": a_group(
