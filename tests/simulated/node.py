@@ -397,6 +397,7 @@ class SimulatedWatch:
     def __init__(self, runtime: SimulatedRuntime) -> None:
         self._rest = runtime.rest()
         self._time_ns = runtime.time_ns
+        self._note_turn = runtime.scheduler.note_turn
         self._random = runtime.scheduler.stream("watch").random
         self._held = runtime.held
         self._held.add("wait set")
@@ -415,6 +416,8 @@ class SimulatedWatch:
     def wait(self, timeout_ns: int) -> Ready:
         seen_until = self._time_ns()
         ready = self._ready()
+        # Who polls again and again while there is something gives no turn to others.
+        self._note_turn()
         if not ready and not self._woken:
             self._rest.wait_ns(timeout_ns)
             ready = self._ready()

@@ -197,6 +197,12 @@ class Scheduler:
             self._ready.append(self.current)
             self._switch()
 
+    def note_turn(self) -> None:
+        """Note that a task goes on without any time passing; too many such turns are a busy loop."""
+        self._turns += 1
+        if self._turns > _MOST_TURNS:
+            self._fail(StuckError(f"{_MOST_TURNS} turns at one instant, now of {self.current.name}\n{self.describe()}"))
+
     def make_ready(self, tasks: list[Task]) -> None:
         """Have tasks that were held go on."""
         self._ready += tasks
@@ -235,9 +241,7 @@ class Scheduler:
     def _next(self) -> Task:
         """Take the task that runs next, after as much time as it takes."""
         ready, now = self._ready, self.now
-        self._turns += 1
-        if self._turns > _MOST_TURNS:
-            self._fail(StuckError(f"{_MOST_TURNS} turns at one instant, now of {self.current.name}\n{self.describe()}"))
+        self.note_turn()
         while True:
             if not ready:
                 self._advance()

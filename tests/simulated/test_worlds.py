@@ -5,6 +5,7 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from syncrelay.dataflow.group import GroupRelay
+from syncrelay.dataflow.inbox import Backlog
 from syncrelay.relay.inputs import TopicInput
 from tests.faults.extent import chosen
 from tests.simulated.play import play, shrunk, world_of
@@ -33,6 +34,11 @@ def test_a_fault_of_the_relay_breaks_a_promise_and_the_world_is_made_smaller(mon
     assert len(small.plan.steps) + len(small.plan.groups) < len(plan.steps) + len(plan.groups)
 
 
+def test_a_relay_that_polls_without_end_is_told(monkeypatch):
+    monkeypatch.setattr(Backlog, "deliver", lambda *_: None)
+    assert any("turns at one instant, now of syncrelay-receive" in broken for broken in play(world_of(4)).broken)
+
+
 def test_a_refusal_that_is_never_tried_again_is_seen(monkeypatch):
     monkeypatch.setattr(TopicInput, "poll", lambda _: None)
-    assert any("no set of message" in broken for broken in play(world_of(1)).broken)
+    assert any("no set of message" in broken for broken in play(world_of(4)).broken)
