@@ -31,6 +31,8 @@ def is_certain(moved: Trials, index: int, target: int | None = REQUIRED) -> bool
     most = min(_LONGEST_WAY, round(_SHARE_OF_PERIOD * period_of(own)))
     messages = moved.inputs[index]
     is_set = messages.are_stamped
+    if not is_set.any():
+        return False
     delays = messages.received[is_set] - shifted(messages.stamps[is_set], moved.config.topics[index].offset_ns)
     # When it was measured, after its stamp: between these.
     last = quantile(delays, _LEAST)

@@ -59,3 +59,11 @@ def test_what_is_certain_is_paired_rightly_however_long_its_messages_take():
             assert farthest_ms(rig, late) <= 1.01 * slop, (seed, period, other, phase, late, slop)
     # Not all that is certain is refused.
     assert certain > 0.2 * chosen(short=200, long=5000)
+
+
+def test_nothing_is_certain_of_an_optional_input_without_a_message():
+    messages = [Message(index, BEGAN + at, BEGAN + at) for at in range(0, 10**10, 10**8) for index in (0, 1)]
+    optional = Source("/imu", hz=1, required=False)
+    config = group_of([Source("/a", hz=10), Source("/b", hz=10), optional], {"slop": "10ms", "max_wait": "1s"})
+    rig = Trials(config, lambda: messages, as_arrays(messages, 3), is_window=True)
+    assert not is_certain(rig, 2)
