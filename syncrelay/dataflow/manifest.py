@@ -89,7 +89,8 @@ class ManifestWriter:
         rows = zip(note.left_as, stamps, note.received, note.sent, strict=True)
         values = [value for row in rows if row[1] is not None for value in row]
         kinds = tuple([None if stamp is None else unpublished.get(index, "") for index, stamp in enumerate(stamps)])
-        digits = list(map(b"%d".__mod__, [*numbers, *values]))
+        # At once: one by one takes half as long again.
+        digits = (b"%d " * (len(numbers) + len(values)) % (*numbers, *values)).split()
         unbundled = unpublished.get(len(stamps))
         key = (common is None, kinds, unbundled, *map(len, digits))
         template = self._templates.get(key) or self._template(key, digits, kinds, unbundled)

@@ -1,13 +1,18 @@
 """Writes recordings: an MCAP file as rosbag2 writes it, alone or in a rosbag2 folder with metadata."""
 
+import zlib
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from struct import Struct
 from types import TracebackType
 from typing import Any, BinaryIO, Final, Literal, Self, TypeAlias
 
+import lz4.frame
 import yaml
-from small_mcap import CompressionType, McapWriter
+import zstandard
+from small_mcap import Chunk, McapWriter, MessageIndex, Opcode
 
 from syncrelay.config.profile import Profile
 from syncrelay.output_files import cannot_be_written, local_path, require_new, written_whole
@@ -19,13 +24,29 @@ _PROFILE: Final = "ros2"
 Compression: TypeAlias = Literal["zstd", "lz4", "none"]
 """How what is written is packed."""
 
+_CHUNK: Final = 1_048_576
+# Opcode, length, channel, sequence, log time, publish time; the payload follows.
+_MESSAGE: Final = Struct("<BQHIQQ")
+_FIELDS: Final = 22
+_MESSAGE_OPCODE: Final = Opcode.MESSAGE.value
+# What saves less than this share is not worth the time that unpacking takes.
+_SAVED: Final = 0.05
+_PACKED: Final[Mapping[Compression, Callable[[bytes], bytes]]] = {
+    "zstd": lambda content: zstandard.ZstdCompressor().compress(content),
+    "lz4": lz4.frame.compress,
+    "none": bytes,
+}
+
 # The version of rosbag2's metadata that Jazzy writes.
 _METADATA_VERSION: Final = 9
 
 
 @dataclass(slots=True)
 class Output:
-    """One topic of a new recording; `count` is its number of messages so far."""
+    """One topic of a new recording; `count` is its number of messages so far.
+
+    `times` and `places` are those of its messages in the chunk that is not full yet.
+    """
 
     channel: int
     topic: str
@@ -33,6 +54,8 @@ class Output:
     type_hash: str
     profile: Profile
     count: int = 0
+    times: list[int] = field(default_factory=list)
+    places: list[int] = field(default_factory=list)
 
 
 class McapOutput:
@@ -55,9 +78,12 @@ class McapOutput:
             self._path = scratch if is_file else scratch / f"{scratch.name}_0{MCAP_SUFFIX}"
             self._file = self._path.open("xb")
             opened.callback(_close, self._file)
-            self._writer = McapWriter(self._file, compression=CompressionType[compression.upper()])
+            self._writer = McapWriter(self._file, use_chunking=False)
             self._writer.start(_PROFILE)
             self._opened = opened.pop_all()
+        self._compression = compression
+        self._chunk: list[bytes] = []
+        self._size = 0
         self._outputs: list[Output] = []
         self._schemas: dict[str, int] = {}
         self._begin: int | None = None
@@ -72,6 +98,7 @@ class McapOutput:
         if error is not None:
             return self._opened.__exit__(kind, error, trace)
         with self._opened:
+            self._write_chunk()
             self._writer.finish()
             self._file.close()
             if self._folder is not None:
@@ -101,10 +128,39 @@ class McapOutput:
 
     def write(self, output: Output, payload: bytes, now: int) -> None:
         """Write a message with the receive time `now`, in nanoseconds."""
-        self._writer.add_message(output.channel, now, payload, now, output.count)
+        length = _FIELDS + len(payload)
+        self._chunk += (_MESSAGE.pack(_MESSAGE_OPCODE, length, output.channel, output.count, now, now), payload)
+        output.times.append(now)
+        output.places.append(self._size)
         output.count += 1
-        self._begin = now if self._begin is None else min(now, self._begin)
-        self._end = max(self._end, now)
+        self._size += _MESSAGE.size - _FIELDS + length
+        if self._size >= _CHUNK:
+            self._write_chunk()
+
+    def _write_chunk(self) -> None:
+        """Write what has come as a chunk, with the index of its messages."""
+        there = sorted((output for output in self._outputs if output.times), key=lambda output: output.places[0])
+        if not there:
+            return
+        content = b"".join(self._chunk)
+        packed = _PACKED[self._compression](content)
+        is_packed = len(content) - len(packed) >= _SAVED * len(content)
+        begin, end = min(min(output.times) for output in there), max(max(output.times) for output in there)
+        chunk = Chunk(
+            compression=self._compression if is_packed else "",
+            data=packed if is_packed else content,
+            message_start_time=begin,
+            message_end_time=end,
+            uncompressed_crc=zlib.crc32(content),
+            uncompressed_size=len(content),
+        )
+        indexes = {output.channel: MessageIndex(output.channel, output.times, output.places) for output in there}
+        self._writer.add_chunk(chunk, indexes)
+        self._begin = begin if self._begin is None else min(begin, self._begin)
+        self._end = max(self._end, end)
+        for output in there:
+            output.times, output.places = [], []
+        self._chunk, self._size = [], 0
 
     def _metadata(self) -> dict[str, Any]:
         begin = self._begin or 0

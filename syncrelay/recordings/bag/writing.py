@@ -1,6 +1,7 @@
 """Writes the sets of a replay as a recording of what the relay would have published."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from syncrelay.cdr import patch_stamp
@@ -16,7 +17,7 @@ from syncrelay.recordings.bag.bundles import recorded_bundle
 from syncrelay.recordings.bag.definitions import as_ros2, begins_with_header, converter, jazzy_definition
 from syncrelay.recordings.bag.mcap_output import McapOutput, Output
 from syncrelay.recordings.bag.recording import Channel, Encoding
-from syncrelay.sync import Match, Message, Outcome
+from syncrelay.sync import Match, Outcome
 
 
 class Outgoing(NamedTuple):
@@ -24,14 +25,6 @@ class Outgoing(NamedTuple):
 
     written: Callable[[bytes, int | None], bytes]
     has_header: bool
-
-
-class _Left(NamedTuple):
-    """A message of a set as it leaves, its stamp then, and when it was received."""
-
-    content: bytes
-    stamp: int
-    received: int
 
 
 class _Bundles(NamedTuple):
@@ -48,6 +41,16 @@ class _Manifest(NamedTuple):
     output: Output
 
 
+@dataclass(slots=True)
+class _Leaving:
+    """How the sets of a group leave: for each input, by the channel, what its payloads become, and its topic if any."""
+
+    payloads: list[dict[Channel, Outgoing]]
+    outputs: list[Output | None]
+    bundles: _Bundles | None = None
+    manifest: _Manifest | None = None
+
+
 class SetWriter:
     """Writes the sets of a replay as the relay would publish them, with the time at which they leave.
 
@@ -57,10 +60,7 @@ class SetWriter:
 
     def __init__(self, recording: McapOutput) -> None:
         self._recording = recording
-        self._outputs: dict[str, Output] = {}
-        self._payloads: dict[tuple[str, Channel], Outgoing] = {}
-        self._manifests: dict[str, _Manifest] = {}
-        self._bundles: dict[str, _Bundles] = {}
+        self._leaving: dict[str, _Leaving] = {}
         self.left_out: list[str] = []
         """A sentence for each group whose bundles are not written, because their type is not installed here."""
         self.messages = 0
@@ -71,57 +71,63 @@ class SetWriter:
 
         Raises BagError where the type of its bundles is installed and cannot hold what was recorded.
         """
-        for each in binding.inputs:
-            for channel in each.channels:
-                self._payloads[each.output, channel] = outgoing(each, channel)
-            if each.channels and binding.group.options.outputs:
-                self._outputs[each.output] = self._output(each)
+        has_outputs = binding.group.options.outputs
+        leaving = _Leaving(
+            [{channel: outgoing(each, channel) for channel in each.channels} for each in binding.inputs],
+            [self._output(each) if each.channels and has_outputs else None for each in binding.inputs],
+        )
         if binding.group.bundle is not None and binding.is_complete:
-            self._add_bundles(binding, binding.group.bundle)
+            leaving.bundles = self._add_bundles(binding, binding.group.bundle)
         if binding.group.options.manifest:
-            self._manifests[binding.group.name] = self._manifest(binding)
+            leaving.manifest = self._manifest(binding)
+        self._leaving[binding.group.name] = leaving
 
     def take(self, binding: GroupBinding, outcome: Outcome, now: int) -> None:
         """Write a set that leaves at `now`; drops are ignored."""
         if not isinstance(outcome, Match):
             return
-        pairs = zip(binding.inputs, outcome.messages, strict=True)
-        left = [None if message is None else self._left(each, message, outcome.stamp) for each, message in pairs]
-        sent = self._publish(binding, outcome, left, now)
-        manifest = self._manifests.get(binding.group.name)
-        if manifest is not None:
-            stamps = [each and each.stamp for each in left]
-            received = [each and each.received for each in left]
-            latency = now - max(each for each in received if each is not None)
-            number, bundles = manifest.output.count + 1, self._bundles.get(binding.group.name)
-            note = Note(number, latency, outcome.stamp, outcome.stamps, stamps, received, sent, {})
-            note = note._replace(bundle=0 if bundles is None else bundles.output.count)
-            self._recording.write(manifest.output, manifest.writer.write(note), now)
+        leaving, common = self._leaving[binding.group.name], outcome.stamp
+        contents: list[bytes | None] = []
+        left_as: list[int | None] = []
+        received: list[int | None] = []
+        for index, message in enumerate(outcome.messages):
+            if message is None:
+                contents.append(None)
+                left_as.append(None)
+                received.append(None)
+                continue
+            channel, at, payload = message.payload
+            written, has_header = leaving.payloads[index][channel]
+            content = written(payload, common)
+            is_as_matched = not has_header or (common is None and binding.inputs[index].config.is_by_header)
+            contents.append(content)
+            left_as.append(message.stamp if is_as_matched else header_stamp(content))
+            received.append(at)
+        sent = self._publish(binding, outcome, contents, now)
+        if leaving.manifest is not None:
+            writer, output = leaving.manifest
+            latency = now - max([each for each in received if each is not None])
+            bundle = 0 if leaving.bundles is None else leaving.bundles.output.count
+            note = Note(output.count + 1, latency, common, outcome.stamps, left_as, received, sent, {}, bundle)
+            self._recording.write(output, writer.write(note), now)
 
-    def _left(self, each: Input, message: Message, stamp: int | None) -> _Left:
-        channel, received, payload = message.payload
-        payload_of = self._payloads[each.output, channel]
-        content = payload_of.written(payload, stamp)
-        is_as_matched = not payload_of.has_header or (stamp is None and each.config.is_by_header)
-        return _Left(content, message.stamp if is_as_matched else header_stamp(content), received)
-
-    def _publish(self, binding: GroupBinding, match: Match, left: Sequence[_Left | None], now: int) -> list[int]:
+    def _publish(
+        self, binding: GroupBinding, match: Match, contents: Sequence[bytes | None], now: int
+    ) -> Sequence[int]:
         """Write the messages of a set; return the number of each among those of its topic, 0 of one that is missing."""
-        outputs = [self._outputs.get(each.output) for each in binding.inputs]
-        bundles = self._bundles.get(binding.group.name)
-        if bundles is not None:
-            contents = [each and each.content for each in left]
+        leaving = self._leaving[binding.group.name]
+        if (bundles := leaving.bundles) is not None:
             try:
                 whole = bundles.bundle.content(contents, match.stamps, match.stamp, bundles.output.count + 1)
             except UnfitError as error:
                 raise BagError(f"{bundles.output.topic}: {error}") from error
             self._write(bundles.output, whole, now)
             if not binding.group.options.outputs:
-                return [bundles.output.count if each is not None else 0 for each in left]
-        sent = [0] * len(left)
-        for index, (each, output) in enumerate(zip(left, outputs, strict=True)):
-            if each is not None and output is not None:
-                self._write(output, each.content, now)
+                return [0 if each is None else bundles.output.count for each in contents]
+        sent = [0] * len(contents)
+        for index, (content, output) in enumerate(zip(contents, leaving.outputs, strict=True)):
+            if content is not None and output is not None:
+                self._write(output, content, now)
                 sent[index] = output.count
         return sent
 
@@ -141,16 +147,16 @@ class SetWriter:
         first = each.channels[0]
         return self._recording.add(each.output, first.type, *as_ros2(first), _profile(each))
 
-    def _add_bundles(self, binding: GroupBinding, config: BundleConfig) -> None:
+    def _add_bundles(self, binding: GroupBinding, config: BundleConfig) -> _Bundles | None:
         recorded = recorded_bundle(binding.group, [channel for each in binding.inputs for channel in each.channels])
         if recorded is None:
             why = f"{config.type} is not installed here, or not sourced"
             self.left_out.append(f"{binding.group.name}: its bundles are left out: {why}")
-            return
+            return None
         profile = matched(config.qos, [_profile(each) for each in binding.inputs if each.channels])
         topic = binding.group.inputs.node.absolute(config.topic)
         output = self._recording.add(topic, config.type, recorded.definition, recorded.type_hash, profile)
-        self._bundles[binding.group.name] = _Bundles(recorded.bundle, output)
+        return _Bundles(recorded.bundle, output)
 
 
 def _profile(each: Input) -> Profile:
