@@ -16,7 +16,7 @@ from syncrelay.config import GroupConfig, load_text
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError
 from syncrelay.relay.groups import Groups
-from syncrelay.relay.ports import Answer, RclError
+from syncrelay.relay.ports import Answer
 from syncrelay.relay.relay import Relay
 from syncrelay.sync.group import SyncGroup
 from tests.conformance.player import play
@@ -24,7 +24,7 @@ from tests.conformance.script import COLOR, IMAGE, MARKER, PAIR, REFERENCE, do, 
 from tests.conformance.scripts import BUNDLE_SET, BUNDLED, COLOR_DATA, IMAGE_DATA
 from tests.conformance.seen import Seen
 from tests.conformance.simulated import SimulatedWorld
-from tests.simulated.node import SimulatedGraph, SimulatedNode, SimulatedSource
+from tests.simulated.node import SimulatedGraph, SimulatedSource
 
 _SENSORS = (do.publisher("/a"), do.publisher("/b"))
 _EARS = (do.subscriber("/front/a"), do.subscriber("/front/b"))
@@ -154,21 +154,6 @@ def test_what_fails_and_what_never_ends_is_answered_and_more_calls_than_can_wait
     assert answers["never 10"] == Answer(success=False, message=too_many)
     ending = [answers[name] for name in ("cancelled", *(f"never {n}" for n in range(10)))]
     assert {*ending} == {Answer(success=False, message="the relay is ending")}
-
-
-def test_what_dds_refuses_is_asked_for_again_though_the_graph_does_not_change(monkeypatch, tmp_path):
-    sound, refused = SimulatedNode.publisher, count()
-
-    def refusing(node, message_type, topic, profile):
-        if topic == "/front/a" and next(refused) < 2:
-            raise RclError("no memory")
-        return sound(node, message_type, topic, profile)
-
-    monkeypatch.setattr(SimulatedNode, "publisher", refusing)
-    steps = (do.relay(PAIR), *_SENSORS, *_EARS, do.finding("refused_by_dds"), do.settled(), do.ready(), do.sets(10))
-    seen = _play(tmp_path, *steps, *_OUT)
-    assert next(refused) == 3
-    assert [each for each in seen.log if "no memory" in each]
 
 
 def test_one_in_the_library_of_a_type_is_told_as_what_its_topic_lacks(monkeypatch, tmp_path):

@@ -165,37 +165,6 @@ def test_a_common_stamp_is_in_the_members_too_and_outputs_are_left_as_they_were(
         )
 
 
-def _publishers(collector):
-    return collector.endpoints("/front/set", kind="publisher")
-
-
-def test_a_reload_leaves_the_bundles_publisher_as_it_is_and_a_lazy_group_wakes_for_it(
-    sourced: Stage, pair: MadeMessages
-):
-    lazy = {"front": _group(outputs=False, lazy=True, manifest=False)}
-    relay = sourced.relay(config(lazy, metrics=ANY_PORT))
-    player = sourced.player(_TOPICS)
-    player.is_up()
-    wait_for_finding(relay, "nobody_listens", naming=["/front/set"])
-    collector = sourced.collector({"/front/set": _PAIR})
-    numbers = count(0, 3)
-    play_until_out(player, collector, (_frames(number) for number in numbers), ["/front/set"])
-    # A node's name may come later than its publishers.
-    wait_until(lambda: [each["node"] for each in _publishers(collector)] == ["/syncrelay"], "the bundle's publisher")
-    before = _publishers(collector)
-    lazy["front"]["slop"] = "19ms"
-    (sourced.folder / "config-0.yaml").write_text(config(lazy, metrics=ANY_PORT))
-    assert sourced.caller().call("reload") == (True, "reloaded: 0 groups unchanged; rebuilt front")
-    had, first = collector.count("/front/set"), next(numbers)
-    player.play([frame for number in range(first, first + 31) for frame in _frames(number)], speed=1e9)
-    played = [_require_whole(pair, payload) for payload in collector.wait_for("/front/set", had + 30)[had : had + 30]]
-    assert played == list(range(first, first + 30))
-    assert _publishers(collector) == before
-    group = groups_of(relay)["front"]
-    assert [each["output"] for each in group["inputs"]] == ["/front/set", "/front/set"]
-    assert [[one["node"] for one in each["subscribers"]] for each in group["inputs"]] == [["/collector"]] * 2
-
-
 @pytest.mark.parametrize(("outputs", "severity"), [(False, "error"), (True, "warn")])
 def test_a_type_that_is_not_there_is_said(stage: Stage, outputs: bool, severity: str):  # noqa: FBT001
     relay = stage.relay(config({"front": _group(outputs=outputs)}, metrics=ANY_PORT))
