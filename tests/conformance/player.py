@@ -435,7 +435,8 @@ class Player:
         """The relay gets SIGTERM, and ends."""
         self._reports()
         state = self._relay.state()
-        self.seen.inside.append(f"{short_of(status_of(state).as_dict())} turned {state.turned_s:.1f} s ago")
+        last = [len(each.last) for each in state.groups]
+        self.seen.inside.append(f"{short_of(status_of(state).as_dict())} {last=} turned {state.turned_s:.1f} s ago")
         running, self._running = self._require, None
         running.end()
         self._until(lambda: running.has_ended, "the end of the relay")

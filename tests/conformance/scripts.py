@@ -399,7 +399,8 @@ _MANAGED: Final = {"lifecycle": True}
 _LIFE: Final = (
     short("nothing leaves while the relay is paused",
         _RIG, do.sets(10), do.feed("/a", 20), do.call("pause"), do.call("pause"), do.finding("paused"), do.sets(30),
-        do.counts(), do.call("resume"), do.call("resume"), do.sets(40), _out(2), do.counts()),
+        do.feed("/a", 0, data=b"\0\1\0\0"), do.counts(), do.call("resume"), do.call("resume"), do.sets(40),
+        _out(2), do.counts()),
     long("a reload while nothing leaves brings groups of which nothing leaves",
         _RIG, do.publisher("/c"), do.call("pause"), do.file({**_front(queue_size=7), "rear": group("/b", "/c")}),
         do.call("reload"), do.subscriber("/rear/b"), do.ready(), do.sets(10, of=("/a", "/b", "/c")), do.counts(),
