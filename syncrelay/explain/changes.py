@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any, NamedTuple, TypeAlias
 
-from syncrelay.config import GroupConfig
+from syncrelay.config import GroupConfig, Tolerance
 from syncrelay.config.file import file_format
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
@@ -26,7 +26,7 @@ class Change(NamedTuple):
             case "queue_size":
                 return int(self.value)
             case _:
-                # A policy's tolerance, whatever its key, `max_wait`, `offset` or `delay`.
+                # A tolerance of the policy, whatever its key, or of an input, `max_wait`, `offset` or `delay`.
                 return parse_duration(self.value)
 
 
@@ -59,6 +59,11 @@ def changed(config: GroupConfig, changes: Changes) -> GroupConfig:
                     topics[each.input] = replace(topic, stamp=value)
                 case "delay":
                     topics[each.input] = replace(topic, delay_ns=value)
+                case "tolerance":
+                    topics[each.input] = replace(topic, tolerance=Tolerance(each.key, value))
+                    keys = list(options.topics)
+                    keys[each.input] = keys[each.input].model_copy(update={each.key: value})
+                    options = options.model_copy(update={"topics": tuple(keys)})
                 case _:
                     topics[each.input] = replace(topic, offset_ns=value)
     return replace(config, options=options, topics=tuple(topics))

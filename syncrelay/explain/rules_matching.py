@@ -1,6 +1,6 @@
 """Findings about matching: sets too wide, queues too short, optional inputs left out, sets that do not leave."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from itertools import groupby
 from math import sqrt
 from statistics import median_low
@@ -10,7 +10,7 @@ from syncrelay.config import Distance, Tolerance
 from syncrelay.config.units import parse_duration
 from syncrelay.config.wording import all_of
 from syncrelay.explain import words
-from syncrelay.explain.apart import over_tolerances, who_is_off
+from syncrelay.explain.apart import over_tolerances, who_is_off, wider_tolerances
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.facts import GroupFacts, InputFacts
@@ -48,7 +48,6 @@ _PAUSE: Final = SECOND
 _PAUSE_PERIODS: Final = 5
 # What fills queues before all inputs have come says nothing of their size.
 _YOUNG: Final = 2 * SECOND
-_CHECK_TOLERANCES: Final = "check how these topics are stamped, or write a wider `tolerance`"
 # The keys that help where a queue overflowed, and where a message came too late for its set.
 _QUEUE: Final = frozenset({"queue_size"})
 _WAITING: Final = frozenset({"queue_size", "max_wait"})
@@ -64,7 +63,8 @@ def over_slop(facts: GroupFacts) -> Found:
         return
     gives_few = facts.has_stopped or facts.standing is Standing.FEW
     if gives_few and (narrow := over_tolerances(facts)) is not None:
-        yield Fault(narrow, _CHECK_TOLERANCES, Severity.ERROR if facts.is_silent else Severity.WARN)
+        severity = Severity.ERROR if facts.is_silent else Severity.WARN
+        yield Fault(narrow, _tolerance_advice(facts, REQUIRED), severity)
         return
     if facts.has_stopped and nearest.share_over(tolerance.ns) > 1 - _MISSED:
         severity = Severity.ERROR if facts.is_silent else Severity.WARN
@@ -154,6 +154,21 @@ def _wide_enough(
     return tried._replace(tried=(*tried.tried, *offsets))
 
 
+def _tolerance_advice(facts: GroupFacts, target: int | None) -> str:
+    """Say which tolerances of inputs to write for a target, if they were tried."""
+    changes = wider_tolerances(facts, target)
+
+    def give(trials: Trials) -> Verdict:
+        if not changes or not trials.is_enough(changes, target):
+            return UNTRIED
+        counts = trials.given(changes, target), trials.given((), target), len(trials.spans(target))
+        return Verdict((Tried(changes, *counts),))
+
+    optional = None if target is REQUIRED else facts.inputs[target].name
+    advice = _advice(facts, _verdict(facts, ("tolerance", target), give), optional)
+    return f"check how these topics are stamped, or {advice or 'write a wider `tolerance`'}"
+
+
 def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find messages that overflowed and then were missed."""
     needed = an_input.counts.needed_queue
@@ -241,7 +256,7 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
             _advice(facts, found, name) or f"check how {nodes(an_input)} stamps its messages",
         )
     if (narrow := over_tolerances(facts, index)) is not None:
-        return f": {narrow}", _CHECK_TOLERANCES
+        return f": {narrow}", _tolerance_advice(facts, index)
     if facts.max_wait is not None and behind > facts.max_wait:
         found = _verdict(facts, about, lambda trials: trials.verdict(index, _WAITING))
         return (
@@ -346,7 +361,7 @@ def more_sets(facts: GroupFacts, code: Code) -> str | None:
     return _advice(facts, _verdict(facts, (code, None), lambda trials: trials.verdict(REQUIRED, keys)))
 
 
-def _verdict(facts: GroupFacts, about: tuple[Code, int | None], question: Callable[[Trials], Verdict]) -> Verdict:
+def _verdict(facts: GroupFacts, about: Hashable, question: Callable[[Trials], Verdict]) -> Verdict:
     return UNTRIED if facts.suggester is None else facts.suggester.ask(about, question, now=facts.figures.now)
 
 
