@@ -108,6 +108,7 @@ docs: $(VENV)/docs
 
 bench: $(VENV)/test
 	$(BIN)/python bench/engine.py
+	$(BIN)/python bench/recordings.py
 	$(BIN)/python bench/relay.py
 
 # Compares what a message costs with the last release. A regression of a tenth fails, be the machine busy or not.

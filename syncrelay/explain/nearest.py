@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from syncrelay.clock import UNREADABLE
 from syncrelay.config import Distance, GroupConfig
+from syncrelay.explain.rows import blocks
 from syncrelay.sync import Message
 from syncrelay.sync.latest_at_ticks import REST_NS
 from syncrelay.sync.ticks import Ticks
@@ -290,14 +291,15 @@ def period_of(stamps: Nanoseconds) -> float:
 def _disjoint(spans: Nanoseconds, partners: Sequence[Nanoseconds]) -> npt.NDArray[np.bool_]:
     """Tell which sets share no message with a tighter one: only these are nearest to each other mutually."""
     order = np.argsort(spans, kind="stable")
-    rows = np.stack(partners, axis=1)[order].tolist()
-    taken: list[set[int]] = [set() for _ in partners]
+    taken = [bytearray(int(each.max(initial=-1)) + 1) for each in partners]
     free = np.zeros(len(spans), dtype=np.bool_)
-    for place, row in zip(order.tolist(), rows, strict=True):
-        if not any(each in used for each, used in zip(row, taken, strict=True)):
-            free[place] = True
-            for each, used in zip(row, taken, strict=True):
-                used.add(each)
+    for some in blocks(order):
+        rows = np.stack([each[some] for each in partners], axis=1).tolist()
+        for place, row in zip(some.tolist(), rows, strict=True):
+            if not any(used[each] for each, used in zip(row, taken, strict=True)):
+                free[place] = True
+                for each, used in zip(row, taken, strict=True):
+                    used[each] = True
     return free
 
 

@@ -132,6 +132,12 @@ class _ColumnOf:
     def __getitem__(self, at: slice) -> Numbers: ...
     def __getitem__(self, at: int | slice) -> int | Numbers:
         if isinstance(at, slice):
-            return self._rows[at][:, self._place]
+            # Not a view, which would keep the other columns.
+            first, after, _ = at.indices(len(self))
+            column = np.empty(max(0, after - first), dtype=np.int64)
+            for begin in range(first, after, BLOCK):
+                some = self._rows[begin : min(begin + BLOCK, after)]
+                column[begin - first : begin - first + len(some)] = some[:, self._place]
+            return column
         at = range(len(self))[at]
         return int(self._rows[at : at + 1][0, self._place])

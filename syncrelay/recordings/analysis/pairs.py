@@ -6,7 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from syncrelay.explain.nearest import Nanoseconds, Received, in_order, sides
+from syncrelay.explain.nearest import Received, in_order, sides
+from syncrelay.explain.rows import Column, Rows
 from syncrelay.recordings.analysis.streams import Stream
 from syncrelay.recordings.analysis.topics import Spread, spread
 
@@ -26,7 +27,7 @@ class Pair:
     second: str
     signed: Spread
     distance: Spread
-    offsets: Nanoseconds
+    offsets: Column
 
 
 def pair(first: Stream, second: Stream, offsets: tuple[int, int]) -> Pair | None:
@@ -41,7 +42,9 @@ def pair(first: Stream, second: Stream, offsets: tuple[int, int]) -> Pair | None
         first, second, one, other = second, first, other, one
     before, after, _ = sides(one, other)
     signed = np.where(after <= before, after, -before)
-    return Pair(first.topic, second.topic, spread(signed), spread(np.abs(signed)), signed)
+    kept = Rows(1)
+    kept.append(signed[:, None])
+    return Pair(first.topic, second.topic, spread(signed), spread(np.abs(signed)), kept.column(0))
 
 
 def worth_seeing(pairs: Sequence[Pair]) -> tuple[int, ...]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, overload
 
 import numpy as np
 
@@ -48,12 +48,30 @@ class Suggestion:
 
 def trials_of(group: GroupConfig, streams: Sequence[Stream], evaluation: Evaluation | None = None) -> Trials:
     """Return trials of a group on a whole recording, of which there may be an evaluation already."""
-    inputs = tuple(Received(*stream.arrays()) for stream in streams)
     # Trials thin nothing, wait for no transforms, and go by ticks, which an evaluation does not keep.
     options = group.options
     is_alike = options.every == 1 and not options.max_rate and options.transforms is None and group.ticks is None
     sets = evaluation.sets.rows.blocks if evaluation is not None and is_alike else None
-    return Trials(group, lambda: messages(streams), inputs, is_window=False, sets=sets)
+    return Trials(group, lambda: messages(streams), _Inputs(streams), is_window=False, sets=sets)
+
+
+class _Inputs(Sequence[Received]):
+    """The messages of each input as arrays, which are made when they are asked for: those of all inputs are large."""
+
+    def __init__(self, streams: Sequence[Stream]) -> None:
+        self._streams = streams
+
+    def __len__(self) -> int:
+        return len(self._streams)
+
+    @overload
+    def __getitem__(self, at: int) -> Received: ...
+    @overload
+    def __getitem__(self, at: slice) -> Sequence[Received]: ...
+    def __getitem__(self, at: int | slice) -> Received | Sequence[Received]:
+        if isinstance(at, slice):
+            return _Inputs(self._streams[at])
+        return Received(*self._streams[at].arrays())
 
 
 def suggest(

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from syncrelay.config import GroupConfig
+from syncrelay.explain.rows import blocks
 from syncrelay.recordings.analysis import Analysis, GroupAnalysis
 from syncrelay.recordings.analysis.html.lanes import Lanes, lanes_of
 from syncrelay.recordings.analysis.mappings import MappedInput, MappingCurve
@@ -101,7 +102,7 @@ def _histogram(pair: Pair, slops: Sequence[int | None]) -> Histogram:
     low, high = (min([low, *(-slop for slop in lines)]), max([high, *lines]))
     margin = max((high - low) // 20, 10)
     edges = np.linspace(low - margin, high + margin, _BINS + 1)
-    counts, _ = np.histogram(pair.offsets, edges)
+    counts = sum((np.histogram(some, edges)[0] for some in blocks(pair.offsets)), np.zeros(_BINS, dtype=np.int64))
     return Histogram(tuple(edges.tolist()), tuple(counts.tolist()), len(pair.offsets) - int(counts.sum()))
 
 
