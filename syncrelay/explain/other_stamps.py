@@ -77,17 +77,27 @@ def by_offset_of_clock(trials: Trials, index: int, change: Change, target: int |
     return trials.by_offset(change, target) if is_known else None
 
 
-def offered_stamps(facts: GroupFacts, code: Code, index: int) -> str:
-    """Say to have an input's stamps mapped, or to go by receipt, and what that gives; nothing if it does not help."""
-    if facts.suggester is None:
+def offered_stamps(facts: GroupFacts, code: Code, index: int, *others: int) -> str:
+    """Say to have an input's stamps mapped, or to go by receipt, and what that gives; nothing if it does not help.
+
+    With `others`, whose stamps are off too, all are mapped: what is mended of one alone brings no set.
+    """
+    if facts.suggester is None or not all(_can_be_followed(facts.inputs[each].figures) for each in others):
         return ""
     figures, name = facts.inputs[index].figures, facts.inputs[index].name
     keys = ("clock", "stamp") if _can_be_followed(figures) else ("stamp",)
 
     def question(trials: Trials) -> Verdict:
-        return by_other_stamps(trials, index, keys=keys, delay=figures.delay_before)
+        before: Changes = ()
+        for other in others:
+            mapped = _mapping(trials, other)
+            if mapped is None:
+                return UNTRIED
+            trials, before = mapped, (*before, Change("clock", "device", other))
+        verdict = by_other_stamps(trials, index, keys=keys, delay=figures.delay_before)
+        return verdict._replace(tried=tuple(replace(each, changes=(*before, *each.changes)) for each in verdict.tried))
 
-    verdict = facts.suggester.ask((code, index, *keys), question, now=facts.figures.now)
+    verdict = facts.suggester.ask((code, index, *others, *keys), question, now=facts.figures.now)
     if verdict.is_open:
         return f"; {if_delay_is_known(name)}"
     if not verdict.tried:
@@ -158,14 +168,22 @@ def _tried(trials: Trials, index: int, target: int | None, keys: Collection[str]
     return Verdict((narrow,)) if narrow else Verdict((), is_open=is_open)
 
 
+def _mapping(trials: Trials, index: int) -> Trials | None:
+    """Return trials of the same messages with an input's stamps mapped; None where they cannot be."""
+    topic = trials.config.topics[index]
+    mapped = None if topic.is_of_device or topic.stamp == "receive" else _mapped(trials, index)
+    if mapped is None or trials.config.inputs.node.use_sim_time:
+        return None
+    return _with_stamps(trials, index, mapped, (Change("clock", "device", index),))
+
+
 def _attempts(
     trials: Trials, index: int, target: int | None, keys: Collection[str], delay: int | None
 ) -> Iterator[tuple[Trials, Changes, bool]]:
     """Yield trials with other stamps of an input's messages, what to write for them, and if the delay is known."""
-    is_mapped = "clock" in keys and not trials.config.inputs.node.use_sim_time
-    if is_mapped and (mapped := _mapped(trials, index)) is not None:
+    if "clock" in keys and (at_once := _mapping(trials, index)) is not None:
         device: Changes = (Change("clock", "device", index),)
-        at_once = _with_stamps(trials, index, mapped, device)
+        mapped = at_once.inputs[index].stamps
         known = [] if delay is None or not 0 <= delay < _LONGEST_DELAY else [_in_tenths(delay)]
         late = [(each, True) for each in known] or [
             (0, False),

@@ -38,7 +38,8 @@ def off_the_clock(facts: GroupFacts) -> Found:
     are_all = len(off) == len(required) > 1 and max(off.values()) - min(off.values()) < _OFF
     whose = "all inputs" if are_all else facts.inputs[index].name
     clock, to_one_clock = _clock(facts)
-    mapped = "" if are_all else offered_stamps(facts, Code.OTHER_CLOCK, index)
+    others = [each for each in off if each != index]
+    mapped = offered_stamps(facts, Code.OTHER_CLOCK, index, *others)
     yield Fault(
         f"stamps of {whose} are {words.span_of_time(abs(by))} {'behind' if by > 0 else 'ahead of'} {clock},"
         " which triggers the sets",

@@ -96,6 +96,24 @@ def test_a_device_is_offered_to_be_mapped_where_that_brings_the_sets_of_a_clock(
     assert (device.last_finding(clock="device").code is Code.HEALTHY) is device.is_young
 
 
+@pytest.mark.parametrize("off_s", [(40, 40), (40, -700)], ids=["by_one_clock", "by_two_clocks"])
+def test_two_devices_that_are_off_the_clock_are_offered_to_be_mapped_together_and_that_cures(off_s):
+    def rig(**topic_options: str) -> Finding:
+        first, second = off_s
+        sources = [
+            Source("/a", hz=20, topic_options=topic_options, clock=lambda _: first),
+            Source("/b", hz=8, topic_options=topic_options, clock=lambda _: second),
+        ]
+        options = {"policy": "latest_time", "trigger": "5 Hz", "max_age": "300ms"}
+        return last_of(run(*sources, seconds=25, options=options))
+
+    finding = rig()
+    assert finding.code is Code.OTHER_CLOCK
+    for topic in ("/a", "/b"):
+        assert f"`clock: device` at {topic}" in (finding.suggestion or "")
+    assert rig(clock="device").code is Code.HEALTHY
+
+
 def test_a_device_is_not_offered_to_be_mapped_at_the_ticks_of_a_simulated_clock():
     config = load_text(
         "{version: 1, node: {use_sim_time: true}, groups: {front: {policy: latest_time, trigger: 10 Hz,"
