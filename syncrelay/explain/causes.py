@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping
 from math import inf
 from typing import Final, NamedTuple
 
-from syncrelay.explain import rules_flow, rules_offset, rules_stamps
+from syncrelay.explain import rules_flow, rules_matching, rules_offset, rules_stamps
 from syncrelay.explain.codes import MATCHING, Code, Of, codes_of
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import SECOND, Finding
-from syncrelay.explain.input_observation import WINDOW_NS
+from syncrelay.explain.order import WINDOW_NS
 from syncrelay.sync.messages import DropReason
 
 # A cause is seen to be over at the next look. By then, what it has left in queues is gone.
@@ -33,6 +33,7 @@ _COUNTED: Final = {
     Code.UNSTAMPED: DropReason.UNSTAMPED,
     Code.DUPLICATES: DropReason.DUPLICATE,
 }
+_OF_ONE_MOMENT: Final = frozenset({Code.OUT_OF_ORDER, Code.DUPLICATES, Code.BURSTS})
 OF_CLOCKS: Final = frozenset({Code.OTHER_CLOCK, Code.CLOCK_STEP, Code.CLOCK_DRIFT})
 
 # What can be mended before the node is activated.
@@ -76,7 +77,9 @@ EXPLAINS: Final[Mapping[Code, Explained]] = {
         frozenset({Code.OVER_SLOP, Code.FEW_SETS, Code.UNEXPLAINED}), frozenset({Code.BURSTS})
     ),
     Code.OUT_OF_ORDER: Explained(frozenset({Code.OVER_SLOP, Code.FEW_SETS, Code.UNEXPLAINED})),
-    Code.DUPLICATES: Explained(frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET, Code.FEW_SETS, Code.UNEXPLAINED})),
+    Code.DUPLICATES: Explained(
+        frozenset({Code.OVER_SLOP, Code.SHORT_QUEUE, Code.CONSTANT_OFFSET, Code.FEW_SETS, Code.UNEXPLAINED})
+    ),
     Code.OVER_SLOP: Explained(frozenset({Code.FEW_SETS, Code.UNEXPLAINED})),
 }
 """Causes, and which other findings they explain. No chain of explanations comes back to where it began."""
@@ -129,6 +132,8 @@ class Cause(NamedTuple):
     ended: int
     most: float = inf
     """How many sets it may have cost."""
+    set_at: int | None = None
+    """When the clock was set, if that is the cause: stamps are off from then on, but fell or came at once only then."""
     was_said: bool = False
     is_aside: bool = False
     """Whether it is about an optional input, and no reason for what befalls the others."""
@@ -142,6 +147,19 @@ def is_aside(finding: Finding, facts: GroupFacts) -> bool:
     return not rules_stamps.swings(facts.inputs[finding.input])
 
 
+def set_at(finding: Finding, facts: GroupFacts) -> int | None:
+    """Return when the clock of an input was set, of a finding that says so."""
+    if finding.code is not Code.CLOCK_STEP or finding.input is None:
+        return None
+    step = facts.inputs[finding.input].figures.stepped
+    return None if step is None else step.at
+
+
+def may_cost(cause: Cause, code: Code, facts: GroupFacts) -> bool:
+    """Whether a cause can have an effect of a code: of what a relay that stood still lost, some find their partners."""
+    return not (cause.finding.code is Code.TOO_SLOW and code is Code.OVER_SLOP and rules_matching.none_is_near(facts))
+
+
 def most_missed(finding: Finding, facts: GroupFacts) -> float:
     """Return how many sets a cause may have cost where it was short: twice those of its time and of a second."""
     lasted = max(rules_flow.waited_for_relay(facts)) / SECOND + 1
@@ -150,6 +168,8 @@ def most_missed(finding: Finding, facts: GroupFacts) -> float:
 
 def effects_until(cause: Cause, code: Code) -> int:
     """Return until when a cause had effects of a code."""
+    if cause.set_at is not None and code in _OF_ONE_MOMENT:
+        return cause.set_at
     # What is sent again after a standstill comes late once, which makes no step.
     lasts = cause.finding.code is Code.TOO_SLOW and cause.ended < cause.at and code is not Code.CLOCK_STEP
     return cause.ended + rules_flow.SENT_AGAIN if lasts else cause.ended

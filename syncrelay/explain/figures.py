@@ -167,6 +167,8 @@ class GroupFigures:
     """Since when `nearest` is measured: at the latest since an input changed its pace or its clock."""
     nearest_at: Sequence[int] = ()
     """When each of `nearest` was measured."""
+    hindered_until: int = 0
+    """Until when a known cause kept sets from leaving: `nearest` is measured from then on."""
     missing: tuple[float, ...] = ()
     """The share, 0 to 1, of the window's sets that each input is missing from."""
     sets_since_without: tuple[int, ...] = ()
@@ -176,15 +178,17 @@ class GroupFigures:
         """Return the same without the spans that were measured until then."""
         old = bisect_right(self.nearest_at, at)
         if not old:
-            return self
+            return replace(self, hindered_until=at)
         kept, lately = len(self.nearest) - old, len(self.nearest_lately)
         nearest = Distribution(self.nearest.newest(kept)[::-1])
         return replace(
             self,
             nearest=nearest,
             nearest_lately=nearest if kept < lately else self.nearest_lately,
+            nearest_since=Distribution(self.nearest_since.newest(min(kept, len(self.nearest_since)))[::-1]),
             nearest_from=self.nearest_at[old] if kept else self.now,
             nearest_at=self.nearest_at[old:],
+            hindered_until=at,
         )
 
     @property

@@ -2,14 +2,15 @@
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from operator import lt, sub
+from operator import sub
 from statistics import median
-from typing import Final, NamedTuple, TypeAlias
+from typing import Final, TypeAlias
 
 from syncrelay.explain.clocks import Drift, drift
 from syncrelay.explain.distribution import Distribution, keep_last, no_values
 from syncrelay.explain.epochs import reading, resolution
 from syncrelay.explain.figures import InputFigures
+from syncrelay.explain.order import JUMP_NS, WINDOW_NS, StampOrder
 from syncrelay.explain.rhythm import AT_ONCE, LEAST_HELD_NS, Burst, PaceWatch, bursts, steady_period
 from syncrelay.explain.standing import Pace
 from syncrelay.explain.steps import StampSteps
@@ -18,11 +19,7 @@ from syncrelay.sync.messages import DropReason
 Arrivals: TypeAlias = Sequence[tuple[int, int]]
 """Stamps and times of receipt of one input's messages as they came, in nanoseconds."""
 
-WINDOW_NS: Final = 10_000_000_000
-"""Rates, drops and faults are those of about this long."""
 _SECOND: Final = 1_000_000_000
-# Stamps that fall by more have jumped, as in the engine.
-_JUMP_NS: Final = 1_000_000_000
 _SILENT_NS: Final = 5_000_000_000
 _SILENT_PERIODS: Final = 5
 _LAST_MESSAGES: Final = 200
@@ -45,14 +42,6 @@ _FAR: Final = 10
 _FAR_NS: Final = 10 * _SECOND
 
 
-class _Faults(NamedTuple):
-    """What was wrong with the stamps of messages that came together, the last of them at `at`."""
-
-    at: int
-    duplicates: int
-    out_of_order: int
-
-
 class InputObservation:
     """Gathers the messages of one input."""
 
@@ -65,15 +54,13 @@ class InputObservation:
         self._paced = no_values()
         self._nearest = no_values()
         self._delays = no_values()
-        self._faults: deque[_Faults] = deque()
+        self._order = StampOrder()
         self._bursts: deque[Burst] = deque()
         self._newest_arrivals: deque[tuple[int, int]] = deque(maxlen=AT_ONCE)
         self._newest_delays: deque[int] = deque(maxlen=AT_ONCE)
         self._points: deque[tuple[int, int]] = deque(maxlen=_DRIFT_POINTS)
         self._points_seen = 0
         self._drift: Drift | None = None
-        self._newest: int | None = None
-        self._fell: tuple[int, int] | None = None
         self._steps = StampSteps()
         self._delay_before: int | None = None
         self._is_simulated = False
@@ -93,9 +80,10 @@ class InputObservation:
         was_simulated, self._is_simulated = self._is_simulated, by_clock is not None
         if (self._received and last < self._received[-1]) or was_simulated is not self._is_simulated:
             self._forget()
+            self._order.forget()
             self._forget_steps()
         self._follow_flow(received)
-        duplicates, out_of_order, fallen = self._judge(stamps, received)
+        fallen = self._order.add(stamps, received)
         all_received = received
         # A stamp of 0 was never set: it tells nothing of a clock.
         stamped = [arrival for arrival in arrivals if arrival[0]] if 0 in stamps else arrivals
@@ -106,9 +94,6 @@ class InputObservation:
             self._follow_steps(received, delays)
         if begin := self._begin_anew(received, delays, has_fallen=fallen):
             stamped, stamps, delays = [*stamped][begin:], stamps[begin:], delays[begin:]
-        while self._faults and self._faults[0].at <= last - WINDOW_NS:
-            self._faults.popleft()
-        self._faults.append(_Faults(last, duplicates, out_of_order))
         keep_last(self._received, all_received, _LAST_MESSAGES)
         keep_last(self._paced, all_received, _LAST_MESSAGES)
         keep_last(self._stamps, stamps if delays else (), _TRIED_MESSAGES)
@@ -138,7 +123,7 @@ class InputObservation:
                 self._delay_before = now + step.by
             old = sum(stamp + delay < at for stamp, delay in zip(self._stamps, self._delays, strict=True))
             del self._stamps[:old], self._delays[:old]
-            self._forget_drift()
+            self._forget_drift(until=at)
             self.changed_at = at
 
     def _begin_anew(self, received: Sequence[int], delays: Sequence[int], *, has_fallen: bool) -> int:
@@ -150,7 +135,7 @@ class InputObservation:
             return 0
         before = self._delays[-1] if self._delays else delays[0]
         # Stamps that do not run as time does may have come to do so.
-        least = _JUMP_NS if has_fallen or self._is_misread else _FAR_NS
+        least = JUMP_NS if has_fallen or self._is_misread else _FAR_NS
         if max(before, *delays) - min(before, *delays) <= least:
             # As nearly always, and seen without looking at each.
             return 0
@@ -200,8 +185,10 @@ class InputObservation:
         self._steps.forget()
         self._delay_before = None
 
-    def _forget_drift(self) -> None:
-        self._points.clear()
+    def _forget_drift(self, until: int | None = None) -> None:
+        # The look in which a clock was set holds stamps of before, too.
+        kept = [] if until is None else [point for point in self._points if point[0] > until][1:]
+        self._points = deque(kept, _DRIFT_POINTS)
         self._drift = None
 
     @property
@@ -241,10 +228,11 @@ class InputObservation:
         now: int,
     ) -> InputFigures:
         """Give the figures; counts are those of the window, which is so many seconds long."""
-        fell_by, fell_at = self._fell or (None, None)
+        fell_by, fell_at = self._order.fell or (None, None)
         rate_hz, usual_hz = self._rates(fed, seconds, now)
-        faulty = [each for each in self._faults if each.at > now - WINDOW_NS and (each.duplicates or each.out_of_order)]
+        faulty = self._order.lately(now)
         repeated = [each.at for each in faulty if each.duplicates]
+        looks = [each.at for each in faulty if each.duplicates or each.falls]
         swings, swung_by = self._steps.swings(now)
         # Of what comes no more, nothing will be known soon.
         goes_on = not self._is_silent_at(now)
@@ -275,8 +263,8 @@ class InputObservation:
             resolution=resolution(self._stamps, self._delays),
             duplicates=sum(each.duplicates for each in faulty),
             out_of_order=sum(each.out_of_order for each in faulty),
-            faulty_looks=len(faulty),
-            faulty_since=faulty[-2].at if len(faulty) > 1 else None,
+            faulty_looks=len(looks),
+            faulty_since=looks[-2] if len(looks) > 1 else None,
             nearest=Distribution(self._nearest[:]),
             bursts=len(bursts),
             held=max((each.held for each in bursts), default=0),
@@ -299,35 +287,10 @@ class InputObservation:
         """Start afresh: a clock jumped, that of the stamps or this machine's."""
         for kept in (self._stamps, self._delays, self._received, self._paced, self._nearest):
             del kept[:]
-        self._faults.clear()
         self._bursts.clear()
         self._newest_arrivals.clear()
         self._newest_delays.clear()
         self._forget_drift()
-
-    def _judge(self, stamps: Sequence[int], received: Sequence[int]) -> tuple[int, int, bool]:
-        """Count what repeats the newest stamp and what is older; whether one fell by more than a second."""
-        duplicates = out_of_order = 0
-        fallen = False
-        newest = self._newest
-        if newest is not None and newest < stamps[0] and all(map(lt, stamps, stamps[1:])):
-            # Each newer than the one before it, as nearly always: seen at a fifth of the cost.
-            self._newest = stamps[-1]
-            return 0, 0, False
-        for stamp, at in zip(stamps, received, strict=True):
-            if newest is None or stamp > newest:
-                newest = stamp
-            elif not stamp:
-                continue
-            elif stamp == newest:
-                duplicates += 1
-            elif stamp < newest - _JUMP_NS:
-                self._fell = (newest - stamp, at)
-                newest, fallen = stamp, True
-            else:
-                out_of_order += 1
-        self._newest = newest
-        return duplicates, out_of_order, fallen
 
     def _measure(self, stamped: Arrivals, delays: Sequence[int], least: int, most: int) -> None:
         """Measure drift and bursts, from messages that have stamps."""

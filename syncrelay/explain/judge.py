@@ -39,15 +39,17 @@ from syncrelay.explain.causes import (
     ended,
     explained_by,
     is_aside,
+    may_cost,
     most_missed,
     over_since,
     seen_since,
+    set_at,
 )
 from syncrelay.explain.codes import MATCHING, Code, Of, Severity
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import Finding, Rule, of_each_input
-from syncrelay.explain.input_observation import WINDOW_NS
 from syncrelay.explain.known_soon import known_soon
+from syncrelay.explain.order import WINDOW_NS
 from syncrelay.explain.standing import BACK, FEW, Standing
 
 _CAUSE_RULES: Final[tuple[Rule, ...]] = (
@@ -191,6 +193,7 @@ class Judge:
                     facts.figures.now,
                     ended(finding, facts),
                     most_missed(finding, facts),
+                    set_at(finding, facts),
                     is_aside=is_aside(finding, facts),
                 )
 
@@ -204,6 +207,7 @@ class Judge:
         """Whether a cause that holds now explains all findings of a code."""
         return any(
             effects_until(cause, code) >= facts.figures.now
+            and may_cost(cause, code, facts)
             and code in EXPLAINS[cause.finding.code].in_group
             and (cause.finding.input is None or facts.inputs[cause.finding.input].required)
             for cause in self._causes.values()
@@ -262,7 +266,7 @@ class Judge:
         return finding
 
     def _explains(self, cause: Cause, finding: Finding, facts: GroupFacts) -> bool:
-        if finding.code in MATCHING and self._is_spent(cause, facts):
+        if not may_cost(cause, finding.code, facts) or (finding.code in MATCHING and self._is_spent(cause, facts)):
             return False
         looks_back = finding.code is Code.FEW_SETS
         if looks_back and facts.figures.share.possible - facts.figures.share.left > cause.most:

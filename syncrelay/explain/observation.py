@@ -10,8 +10,9 @@ from typing import Any, Final, NamedTuple, TypeAlias
 from syncrelay.config import Distance, GroupConfig
 from syncrelay.explain.distribution import Distribution, Tallied, keep_last, no_values
 from syncrelay.explain.figures import GroupFigures, InputFigures
-from syncrelay.explain.input_observation import WINDOW_NS, Arrivals, InputObservation
+from syncrelay.explain.input_observation import Arrivals, InputObservation
 from syncrelay.explain.nearest import NearestSpans
+from syncrelay.explain.order import WINDOW_NS
 from syncrelay.explain.standing import ShareWindow
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason

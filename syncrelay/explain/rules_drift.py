@@ -16,8 +16,6 @@ from syncrelay.explain.other_stamps import offered_stamps
 _DRIFTED: Final = 5_000_000
 _DRIFT_WATCHED: Final = 8 * SECOND
 _DRIFT_BENDS: Final = 8
-# Of what came for less than this, no drift is known.
-_YOUNG: Final = 4 * SECOND
 _USUAL: Final = 0.95
 # Wait this long for proof of a drift; the second time only, from when sets are missing, unless stamps look like one.
 _DRIFT_PROVEN: Final = 60 * SECOND
@@ -62,11 +60,9 @@ def may_drift(facts: GroupFacts) -> bool:
     moves = needed * (facts.figures.now - measured_at[0]) if measured_at else 0
     if nearest.quantile(_USUAL) - nearest.quantile(1 - _USUAL) < _MATTERS * moves:
         return False
-    required = [each.figures for each in facts.inputs if each.required]
-    young = [each.flows_since or facts.figures.now for each in required if each.drift is None]
-    if facts.by_stamp and any(facts.figures.now - since < _YOUNG for since in young):
-        return True
     is_urgent = (facts.silent_for if facts.is_silent else watched) >= _DRIFT_PROVEN_SILENT
+    if facts.by_stamp and not is_urgent and any(each.required and each.figures.drift is None for each in facts.inputs):
+        return True
     return any(
         abs(each.slope) >= max(needed, each.error) or (not is_urgent and abs(each.slope) + each.error >= needed)
         for each in _drifts(facts)[1].values()

@@ -28,6 +28,8 @@ _MISSED: Final = 0.05
 _FEWEST: Final = 5
 # Where no set leaves, and none of so few could, that is why.
 _FEWEST_OF_NONE: Final = 3
+# So many show that none is near: of those that a relay misses some are, and a few may be of before.
+_SHOWN_BY: Final = 10
 # So unlikely is chance.
 _BY_CHANCE: Final = 0.001
 # Where messages were held up, wide spans say something about slop only if most are wide.
@@ -114,6 +116,14 @@ def is_near_again(facts: GroupFacts) -> bool:
     over = (sum(each > tolerance.ns for each in spans) + 1) / (len(spans) - newest + 2)
     # Where clocks drift through each other, they are near again and again.
     return (1 - over) ** newest < _BY_CHANCE and newest > 2 * max(before, default=0)
+
+
+def none_is_near(facts: GroupFacts) -> bool:
+    """Whether hardly any of the newest messages have a near partner, and no set leaves."""
+    tolerance, nearest = facts.tolerance, facts.figures.nearest_since
+    if tolerance is None or not facts.has_stopped or len(nearest) < _SHOWN_BY:
+        return False
+    return nearest.share_over(tolerance.ns) > 1 - _MISSED
 
 
 def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
@@ -338,7 +348,8 @@ def is_too_soon(facts: GroupFacts) -> bool:
     """Whether too few messages of slow inputs have come to say how far apart they are."""
     measured = sum(each.required and each.own_tolerance is None for each in facts.inputs) > 1
     few = len(facts.figures.nearest_since) < _FEWEST_OF_NONE
-    return measured and facts.tolerance is not None and few and facts.silent_for * facts.possible_hz < _FEWEST * SECOND
+    missing_for = min(facts.silent_for, facts.figures.now - facts.figures.hindered_until)
+    return measured and facts.tolerance is not None and few and missing_for * facts.possible_hz < _FEWEST * SECOND
 
 
 def left_of_possible(facts: GroupFacts) -> str:

@@ -13,12 +13,15 @@ from syncrelay.explain.rules_stamps import offered_offset, other_clock
 
 # Stamps a constant distance apart may pair wrong messages: at least this many, at least this share of a period apart,
 # of rates that differ by no more than this share, scattering by no more than this share of a period, and within this
-# share of a whole number of periods by their times of receipt.
+# share of a whole number of periods by their times of receipt: the greater where stamps are ahead of their time, as it
+# is certain then that they are off.
 ENOUGH: Final = 20
 _OFF: Final = 0.15
 _SAME_RATE: Final = 0.05
 _SCATTERS: Final = 0.25
 _WHOLE: Final = 0.1
+_WHOLE_AHEAD: Final = 0.3
+_AHEAD: Final = 0.25
 _OTHER_CLOCK: Final = SECOND
 
 
@@ -56,14 +59,18 @@ def _whole_periods_off(facts: GroupFacts, first: int, other: int) -> int | None:
         return None
     later = two.figures.delays[-1] - two.offset - one.figures.delays[-1] + one.offset
     period = SECOND / two.figures.pace_hz
-    if abs(later) < period / 2 or abs(later) > _OTHER_CLOCK:
+    is_same_rate = abs(one.figures.pace_hz * period / SECOND - 1) <= _SAME_RATE
+    if abs(later) < period / 2 or abs(later) > _OTHER_CLOCK or not is_same_rate:
         # As nearly always, and seen without measuring.
-        return None
-    if abs(one.figures.pace_hz * period / SECOND - 1) > _SAME_RATE:
         return None
     stamps = (shifted(np.array(each.figures.stamps, dtype=np.int64), each.offset) for each in (one, two))
     signed = signed_distances(*map(np.sort, stamps))
-    if len(signed) < ENOUGH or quantile(signed, 0.95) - quantile(signed, 0.05) > _SCATTERS * period:
+    if len(signed) < ENOUGH:
+        return None
+    # Amid two messages, now the one is nearest and now the other, a period apart: of these, the usual one counts.
+    usual = quantile(signed, 0.5)
+    signed -= (np.round((signed - usual) / period) * period).astype(np.int64)
+    if quantile(signed, 0.95) - quantile(signed, 0.05) > _SCATTERS * period:
         return None
     distance = quantile(signed, 0.5)
     later = (two.figures.delay or 0) - two.offset - (one.figures.delay or 0) + one.offset
@@ -71,7 +78,9 @@ def _whole_periods_off(facts: GroupFacts, first: int, other: int) -> int | None:
     whole = round(apart / period)
     delay = max((two.figures.delay or 0) - two.offset, (one.figures.delay or 0) - one.offset, key=abs)
     # Results that take long have the stamps of what they are of. None is stamped before its time.
-    may_be_result = delay > -period / 4 and abs(distance) < _OFF * period
-    if not whole or may_be_result or abs(apart - whole * period) > _WHOLE * period:
+    is_ahead = delay <= -_AHEAD * period
+    may_be_result = not is_ahead and abs(distance) < _OFF * period
+    near = _WHOLE_AHEAD if is_ahead else _WHOLE
+    if not whole or may_be_result or abs(apart - whole * period) > near * period:
         return None
     return round(distance - whole * period)

@@ -14,7 +14,7 @@ from syncrelay.explain.epochs import time_scale
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.figures import InputFigures
 from syncrelay.explain.findings import SECOND, Fault, Found, blocks, counted, nodes, written
-from syncrelay.explain.input_observation import WINDOW_NS
+from syncrelay.explain.order import WINDOW_NS
 from syncrelay.explain.other_stamps import by_offset_of_clock, offered_stamps
 from syncrelay.explain.rules_flow import waited_for_relay
 from syncrelay.explain.standing import Standing

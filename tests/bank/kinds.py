@@ -99,14 +99,19 @@ def _shift(rig: Rig, flow: Flow, by: int, codes: str) -> Truth | None:
     if not len(distances) or not len(spans(rig)):
         return None
     fits = np.median(distances) < 0.15 * period
+    delay = float(np.median(flow.received - (flow.stamps - rig.began)))
     n = min(len(pivot.true), len(flow.true), 50)
     phase = int(np.median(flow.true[:n] - pivot.true[:n])) if is_same else 0
     if (lost < 0.95 and not (is_whole and lost < 0.05)) or (is_whole and (fits or abs(phase) > 0.08 * period)):
         flow.stamps = before
         return None
     late = max(each.lateness for each in rig.flows) - min(each.lateness for each in rig.flows)
+    # Where sets leave, and no stamp is ahead of its time, only that messages come at the same part of their periods
+    # shows which belong together: else the one may as well take that long, or be of another moment.
+    if is_whole and delay > -0.25 * period and late > 0.08 * period:
+        flow.stamps = before
+        return None
     # Of two, whose stamps are off by less than they are late by, either may be.
-    delay = float(np.median(flow.received - (flow.stamps - rig.began)))
     either = len(rig.flows) == 2 and (abs(by) < max(100 * MS, 2 * late) or 0 <= delay < 100 * MS)
     topics = frozenset(each.topic for each in rig.flows) if either else frozenset({flow.topic})
     # Of two free-running inputs it is the distance of neighbours that is seen, and no more than that where some take so
@@ -484,6 +489,8 @@ def short_queue(rig: Rig) -> Truth | None:
     """Messages of an input come so late that those of the others have left the queue."""
     flow, late = _one(rig), rig.chance.uniform(0.2, 3)
     size = rig.chance.choice([2, 5, 10])
+    if size == rig.options["queue_size"]:
+        return None
     others = [each for each in rig.flows if each is not flow]
     if not any(each.hz * late > 2 * size + 3 for each in others):
         return None
@@ -497,7 +504,9 @@ def short_queue(rig: Rig) -> Truth | None:
 @_kind()
 def narrow_slop(rig: Rig) -> Truth | None:
     """The slop is less than what sets span."""
-    widths = spans(rig)
+    # Inputs that drift apart span more with time: it is what they span at first that shows.
+    until = rig.seen(periods=10) + 7
+    widths = spans(rig, [replace(each, stamps=each.stamps[~each.since(until)]) for each in rig.flows])
     if len(widths) < 10 or np.median(widths) < MS:
         return None
     rig.options["slop"] = f"{round(np.median(widths) * rig.chance.uniform(0.2, 0.9))}ns"

@@ -97,7 +97,17 @@ def _truth_after(draw: Drawn, named: int, at: float) -> Truth | None:
         return None
     takes = truth.seen - (rig.begin or rig.starts)
     codes = truth.codes | _OFF if other in _STEPS else truth.codes
-    return replace(truth, codes=codes, seen=max(truth.seen, at + takes))
+    after = replace(truth, codes=codes, seen=max(truth.seen, at + takes))
+    if truth.unit == "share":
+        # What is lost by chance is told of the messages that are seen by then.
+        (topic,) = truth.topics
+        came, sent = (_count(each, topic, max(at, rig.begin), after.seen) for each in (rig, draw.well))
+        after = replace(after, sizes=(1 - came / max(1, sent),))
+    return after
+
+
+def _count(rig: Rig, topic: str, begin: float, end: float) -> int:
+    return sum(int(np.sum(each.since(begin) & ~each.since(end))) for each in rig.flows if each.topic == topic)
 
 
 def _shows(rig: Rig) -> bool:

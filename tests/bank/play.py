@@ -29,6 +29,8 @@ _ATTEMPTS: Final = 100
 # A standstill of the relay is truly told, for as long as it is seen.
 _STALL_TOLD_S: Final = 12.0
 _NOT_YET: Final = "not known yet"
+# Kinds of findings that say how far a clock is off.
+_CLOCKS: Final = frozenset({"other_clock", "several_publishers"})
 # What is only known once a size is: a time scale is told by how far off it is.
 _BY_SIZE: Final = frozenset({"size", "words"})
 _FIGURE: Final = re.compile(r"(\d+(?:\.\d+)?) ?(ns|us|ms|s|min|h|days|years|ppm|Hz|times|%)(?![\w/])")
@@ -178,8 +180,13 @@ def drawn(
             break
     if "stalls" not in names:
         _stall(rig)
+    if "all_held" in names:
+        # While the relay stands still, nobody sees what the network does.
+        held = truths[names.index("all_held")]
+        rig.stops = [each for each in rig.stops if each[1] < held.seen - held.sizes[0] / S or each[0] > held.seen]
     late = sum(end - begin for begin, end in rig.stops)
     truths = tuple(replace(each, seen=each.seen + late) for each in truths)
+    alone = tuple(each._replace(truth=replace(each.truth, seen=each.truth.seen + late)) for each in alone)
     seconds = max(each.seen for each in truths) + IN_TIME_S + _GRACE_S
     return Drawn(seed, names, rig, truths, seconds, _looks(chance, seconds), well, alone)
 
@@ -218,7 +225,9 @@ def _faulty(chance: random.Random, kinds: list[Kind], midway: tuple[float, float
             one = _copy(well)
             is_true = _put_in(one, *draw)
             # Of one clock that is off by two causes, what is seen is their sum.
-            if any("other_clock" in each.codes & truth.codes and each.topics & truth.topics for each in truths[:-1]):
+            if any(
+                _CLOCKS & each.codes and _CLOCKS & truth.codes and each.topics & truth.topics for each in truths[:-1]
+            ):
                 return None
             if is_true is None or (is_true.codes, is_true.topics) != (truth.codes, truth.topics):
                 return None

@@ -4,11 +4,13 @@ from collections.abc import Sequence
 from operator import add
 from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.explain.input_observation import InputObservation
 from syncrelay.explain.observation import Observation
+from syncrelay.explain.order import StampOrder
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
 from tests.explain.scenario import Source, group_of
@@ -111,6 +113,24 @@ def test_nothing_is_left_of_delays_when_this_machines_clock_is_set_back_and_no_s
     assert (stage.inputs[0].delay, stage.inputs[0].jitter) == (None, None)
 
 
+@pytest.mark.parametrize(
+    ("stamps_ms", "expected"),
+    [
+        ([0, 1400, 2800, 700, 4200, 5600], (1, 1)),
+        ([0, 1400, 2800, 1000, 2400, 3800], (0, 0)),
+        ([0, 1400, 2800, 2100, 4200, 3500], (2, 2)),
+        ([0, 1400, 2800, 2100, 2200, 4200], (2, 1)),
+    ],
+    ids=["late_by_more_than_a_second", "set_back_by_more", "late_twice", "set_back_by_less"],
+)
+def test_what_came_late_is_told_from_a_clock_that_was_set_back(stamps_ms, expected):
+    order = StampOrder()
+    for number, stamp in enumerate(stamps_ms):
+        order.add([BEGAN + stamp * MS], [BEGAN + number * 1400 * MS])
+    lately = order.lately(BEGAN + 8 * S)
+    assert (sum(each.out_of_order for each in lately), sum(each.falls for each in lately)) == expected
+
+
 def test_memory_does_not_grow_with_time():
     stage = Stage()
 
@@ -118,7 +138,7 @@ def test_memory_does_not_grow_with_time():
         observation = stage.observation
         kept: list[Any] = [observation._polls, observation._spans, observation._latencies, observation._nearest]  # noqa: SLF001  memory is the promise
         for each in observation.inputs:
-            kept += [each._stamps, each._received, each._delays, each._faults, each._points]  # noqa: SLF001
+            kept += [each._stamps, each._received, each._delays, each._order._faults, each._points]  # noqa: SLF001
         return sum(map(len, kept))
 
     for _ in range(330):
