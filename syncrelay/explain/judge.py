@@ -340,8 +340,8 @@ def with_ok(facts: GroupFacts, found: tuple[Finding, ...]) -> tuple[Finding, ...
     elif share.value is None and share.left < share.possible:
         text = f"{share.left} of {share.possible} possible sets so far, which is too soon to judge"
         severity = Severity.OK
-    elif facts.is_look and share.value is None and not share.is_certain:
-        few = facts.pacemaker.name if share.pacemaker is None else facts.inputs[share.pacemaker].name
+    elif facts.is_look and share.value is None and share.unsteady is not None:
+        few = facts.inputs[share.unsteady].name
         sets = counted(figures.sets, "set")
         text, severity = f"{sets} so far, but too few messages of {few} to tell how many were possible", Severity.OK
     else:

@@ -59,8 +59,8 @@ class Share:
 
     The needed input with the fewest messages, received or expected, limits what is `possible`. It is the `pacemaker`;
     None if a clock makes the sets. `absent` counts its messages that should have come, at its usual pace, and did not.
-    `is_pausing` is set while those of any input still do not come. `is_certain` is unset where more sets may have been
-    possible: nothing shows what a pacemaker without a steady pace lost.
+    `is_pausing` is set while those of any input still do not come. A needed input without a steady pace is `unsteady`:
+    nothing shows what it lost, so more sets may have been possible.
     """
 
     left: int = 0
@@ -69,7 +69,7 @@ class Share:
     pacemaker: int | None = None
     absent: int = 0
     is_pausing: bool = False
-    is_certain: bool = True
+    unsteady: int | None = None
 
     @property
     def value(self) -> float | None:
@@ -236,10 +236,8 @@ class ShareWindow:
         alike = (each for each in due if each[0] <= 1 + (1 + _UNSURE) * max(possible, waiting))
         _, absent, pacemaker = max(alike, key=lambda each: (each[1], -each[0]))
         is_pausing = any(self._is_pausing[index] for _, _, index in due)
-        is_certain = any(self._is_steady[index] for allowed, _, index in due if allowed == possible)
-        return Share(
-            left, self._thinned(possible, ns), ns, pacemaker, absent, is_pausing=is_pausing, is_certain=is_certain
-        )
+        unsteady = next((index for _, _, index in due if not self._is_steady[index]), None)
+        return Share(left, self._thinned(possible, ns), ns, pacemaker, absent, is_pausing, unsteady)
 
     def _thinned(self, possible: int, ns: int) -> int:
         return min(possible, ns // self._least_period) if self._least_period else possible
