@@ -57,6 +57,7 @@ class Caller:
 
     def ask(self, kind: Any, service: str, **request: Any) -> Any:
         """Call a service of any kind below the node's name; its answer."""
+        self._be_found(self._client(kind, service))
         return self._result(self._future(kind, service, **request))
 
     def spin(self) -> None:
@@ -67,13 +68,35 @@ class Caller:
         self._executor.shutdown()
         leave(self.node, self._context)
 
-    def _future(self, kind: Any, service: str, **request: Any) -> Any:
+    def _client(self, kind: Any, service: str) -> Any:
         name = f"{self.called}/{service}"
         if name not in self._clients:
             self._clients[name] = self.node.create_client(kind, name)
         if not self._clients[name].wait_for_service(DEADLINE_S):
             raise TimeoutError(f"nobody offers {name}")
-        return self._clients[name].call_async(kind.Request(**request))
+        return self._clients[name]
+
+    def _be_found(self, client: Any) -> None:
+        """Wait until the node has found a client: rmw drops an answer to one that it finds 100 ms later.
+
+        Nothing tells, but a node finds what another made in that order. So one that is made after it is answered, with
+        something that may be asked again, until it is.
+        """
+        later = self.node.create_client(GetParameters, f"{self.called}/get_parameters")
+        later.wait_for_service(DEADLINE_S)
+        end = time.monotonic() + DEADLINE_S
+        try:
+            while time.monotonic() < end:
+                answer = later.call_async(GetParameters.Request())
+                self._executor.spin_until_future_complete(answer, timeout_sec=1)
+                if answer.done():
+                    return
+        finally:
+            self.node.destroy_client(later)
+        raise TimeoutError(f"{self.called} does not find {client.srv_name}")
+
+    def _future(self, kind: Any, service: str, **request: Any) -> Any:
+        return self._client(kind, service).call_async(kind.Request(**request))
 
     def _result(self, future: Any) -> Any:
         end = time.monotonic() + DEADLINE_S
