@@ -3,10 +3,13 @@
 import os
 import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import IO, Final, Protocol, TypeAlias, overload
 
 import numpy as np
 import numpy.typing as npt
+
+from syncrelay.errors import OutputError
 
 Numbers: TypeAlias = npt.NDArray[np.int64]
 
@@ -54,7 +57,7 @@ class Rows:
         self._in_blocks = 0
 
     def append(self, rows: Numbers) -> None:
-        """Add rows at the end."""
+        """Add rows at the end. Raises OutputError if the temporary file cannot be written."""
         if not len(rows):
             return
         self._last.append(rows)
@@ -73,14 +76,20 @@ class Rows:
         if (len(self._blocks) + 1) * block.size * _BYTES <= self._in_memory:
             self._blocks.append(block.copy())
             return
-        if self._file is None:
-            self._file = tempfile.TemporaryFile()  # noqa: SIM115  closed by __del__
-        self._file.write(block.tobytes())
-        self._file.flush()
+        try:
+            if self._file is None:
+                self._file = tempfile.TemporaryFile()  # noqa: SIM115  closed by __del__
+            self._file.write(block.tobytes())
+            self._file.flush()
+        except OSError as error:
+            why = f"{tempfile.tempdir or 'a temporary file'}: cannot be written: {error.strerror or error}"
+            raise OutputError(f"{why}; set TMPDIR to another folder") from error
 
     def __del__(self) -> None:
         if self._file is not None:
-            self._file.close()
+            # What could not be written would be tried once more.
+            with suppress(OSError):
+                self._file.close()
 
     def __len__(self) -> int:
         return self._in_blocks + self._in_last

@@ -1,9 +1,14 @@
 """Rows of numbers are what was appended, whichever of them are in memory and whichever in the file."""
 
+import tempfile
+from pathlib import Path
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from syncrelay.errors import OutputError
 from syncrelay.explain.rows import BLOCK, Rows, blocks
 
 _SIZES = st.integers(0, 3 * BLOCK)
@@ -25,3 +30,9 @@ def test_any_stretch_is_what_was_appended(sizes, width, ends):
     assert np.array_equal(np.concatenate([*blocks(column), whole[:0, 0]]), whole[:, -1])
     if len(whole):
         assert (column[0], column[-1], column[len(whole) // 2]) == tuple(whole[[0, -1, len(whole) // 2], -1].tolist())
+
+
+def test_a_full_disk_is_said_with_what_helps(monkeypatch):
+    monkeypatch.setattr(tempfile, "TemporaryFile", lambda: Path("/dev/full").open("r+b"))  # noqa: SIM115
+    with pytest.raises(OutputError, match="cannot be written: No space left on device; set TMPDIR to another folder"):
+        Rows(1, in_memory=0).append(np.zeros((BLOCK, 1), dtype=np.int64))

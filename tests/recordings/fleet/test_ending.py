@@ -86,20 +86,7 @@ def test_a_run_that_is_killed_at_any_moment_ends_as_an_undisturbed_one(tmp_path,
     make_fleet(tmp_path, counts=range(20, 20 + count))
     assert replay_into(tmp_path, into="undisturbed").returncode == 0
     chance = random.Random(24)
-    words = [
-        sys.executable,
-        "-m",
-        "syncrelay",
-        "fleet",
-        "replay",
-        "bags",
-        "--config",
-        FILE,
-        "--into",
-        "out",
-        "--jobs",
-        "2",
-    ]
+    words = [sys.executable, "-m", "syncrelay", *f"fleet replay bags --config {FILE} --into out --jobs 2".split()]
     killed = {"command": 0, "worker": 0}
     while sum(killed.values()) < _KILLS:
         if lines(tmp_path / "out") > count:

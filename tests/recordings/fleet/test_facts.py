@@ -85,19 +85,7 @@ class Fleet:
             each.write(folder)
         for slop, into in (("5ms", "old"), ("20ms", "new")):
             (folder / FILE).write_text(file_text(slop=slop))
-            words = (
-                "fleet",
-                "analyze",
-                "bags",
-                "--config",
-                FILE,
-                "--into",
-                into,
-                "--jobs",
-                "2",
-                "--robot",
-                "{robot}/{day}/*",
-            )
+            words = f"fleet analyze bags --config {FILE} --into {into} --jobs 2 --robot {{robot}}/{{day}}/*".split()
             self.ended = run(*words, folder=folder)
             assert self.ended.returncode == 1, self.ended.stderr
         self.as_json = run(*words, "--json", folder=folder).stdout

@@ -49,21 +49,7 @@ def test_it_leaves_what_this_machines_cores_leave(isolated, tmp_path):
     make_fleet(tmp_path)
     (tmp_path / "bags" / "bad.mcap").write_bytes(b"")
     local = replay_into(tmp_path, into="local")
-    words = (
-        "-m",
-        "syncrelay",
-        "fleet",
-        "replay",
-        "bags",
-        "--config",
-        FILE,
-        "--engine",
-        "ray",
-        "--jobs",
-        "2",
-        "--into",
-        "ray",
-    )
+    words = f"-m syncrelay fleet replay bags --config {FILE} --engine ray --jobs 2 --into ray".split()
     ended = isolated(*words, folder=tmp_path)
     assert (ended.returncode, ended.stdout) == (1, "ray: 4 recordings: 3 done, 1 failed\n")
     assert local.stderr in ended.stderr
