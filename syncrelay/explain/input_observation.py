@@ -10,10 +10,11 @@ from syncrelay.explain.clocks import Drift, drift
 from syncrelay.explain.distribution import Distribution, keep_last, no_values
 from syncrelay.explain.epochs import reading, resolution
 from syncrelay.explain.figures import InputFigures
-from syncrelay.explain.order import JUMP_NS, WINDOW_NS, StampOrder
+from syncrelay.explain.order import WINDOW_NS, StampOrder
 from syncrelay.explain.rhythm import AT_ONCE, LEAST_HELD_NS, Burst, PaceWatch, bursts, steady_period
 from syncrelay.explain.standing import Pace
 from syncrelay.explain.steps import StampSteps
+from syncrelay.sync.arrivals import JUMP_NS
 from syncrelay.sync.messages import DropReason
 
 Arrivals: TypeAlias = Sequence[tuple[int, int]]

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from operator import lt
 from typing import Final, NamedTuple
 
+from syncrelay.sync.arrivals import JUMP_NS
+
 WINDOW_NS: Final = 10_000_000_000
 """Rates, drops and faults are those of about this long."""
-JUMP_NS: Final = 1_000_000_000
-"""Stamps that fall by more have jumped, as in the engine."""
 
 
 class Faults(NamedTuple):
@@ -42,7 +42,7 @@ class StampOrder:
         self._fell_from: int | None = None
 
     def forget(self) -> None:
-        """Bear that this machine's clock was set: the faults of before are of no time."""
+        """Forget the faults so far: this machine's clock was set, so the times at which they came mean nothing."""
         self._faults.clear()
 
     def lately(self, now: int) -> Sequence[Faults]:
