@@ -10,22 +10,11 @@ from syncrelay.explain.cause_log import CauseLog
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import BOUNDS_NS, Distribution, Histogram
 from syncrelay.explain.dry_run import EngineDriver
-from syncrelay.explain.facts import (
-    ClockState,
-    Endpoint,
-    GraphSnapshot,
-    GroupFacts,
-    InputFacts,
-    InputGraph,
-    Pause,
-    Refusal,
-    Sender,
-    Standstill,
-    Unbundled,
-)
+from syncrelay.explain.facts import ClockState, GroupFacts, InputFacts, Pause, Standstill
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.finding_log import FindingLog, in_words
 from syncrelay.explain.findings import Finding
+from syncrelay.explain.graph_facts import Endpoint, GraphSnapshot, InputGraph, Refusal, Sender, Unbundled
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.judge import Judge, explanation, judge, with_ok
 from syncrelay.explain.lines import GroupLines

@@ -6,8 +6,9 @@ from statistics import median_low
 from typing import Final
 
 from syncrelay.explain import words
-from syncrelay.explain.facts import GroupFacts, InputFacts, InputGraph, Sender
+from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Fault, Found, nodes
+from syncrelay.explain.graph_facts import InputGraph, Sender
 from syncrelay.explain.rhythm import RECOVERED
 
 _TOO_SLOW: Final = 500_000_000

@@ -7,8 +7,9 @@ from syncrelay.config.installed import suspects
 from syncrelay.config.wording import all_of, one_of
 from syncrelay.explain import words
 from syncrelay.explain.codes import Severity
-from syncrelay.explain.facts import NO_SECOND, Endpoint, GraphSnapshot, GroupFacts, InputFacts, Refusal, serving
+from syncrelay.explain.facts import NO_SECOND, GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Fault, Found, absence, blocks
+from syncrelay.explain.graph_facts import Endpoint, GraphSnapshot, Refusal, serving
 from syncrelay.sync.messages import DropReason
 
 _NO_MESSAGE: Final = 5 * SECOND

@@ -6,8 +6,9 @@ from typing import Unpack
 
 from syncrelay.clock import Step
 from syncrelay.config import GroupConfig
-from syncrelay.explain.facts import Around, GroupFacts, InputFacts, InputGraph, serving
+from syncrelay.explain.facts import Around, GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND
+from syncrelay.explain.graph_facts import InputGraph, serving
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.standing import StandingWatch
