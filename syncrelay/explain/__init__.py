@@ -14,7 +14,7 @@ from syncrelay.explain.facts import ClockState, GroupFacts, InputFacts, Pause, S
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.finding_log import FindingLog, in_words
 from syncrelay.explain.findings import Finding
-from syncrelay.explain.graph_facts import Endpoint, GraphSnapshot, InputGraph, Refusal, Sender, Unbundled
+from syncrelay.explain.graph_facts import BundleGraph, Endpoint, GraphSnapshot, InputGraph, Refusal, Sender
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.judge import Judge, explanation, judge, with_ok
 from syncrelay.explain.lines import GroupLines
@@ -36,6 +36,7 @@ __all__ = [
     "STEP_NS",
     "UNREADABLE",
     "Arrivals",
+    "BundleGraph",
     "CauseLog",
     "ClockState",
     "Code",
@@ -75,7 +76,6 @@ __all__ = [
     "Tolerance",
     "Trouble",
     "TryBudget",
-    "Unbundled",
     "drop_fates",
     "explanation",
     "in_words",

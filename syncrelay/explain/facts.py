@@ -7,7 +7,7 @@ from typing import Final, NamedTuple, TypedDict
 from syncrelay.clock import Step
 from syncrelay.config import Distance, Tolerance, TransformsConfig
 from syncrelay.explain.figures import GroupFigures, InputFigures
-from syncrelay.explain.graph_facts import Endpoint, GraphSnapshot, InputGraph, Unbundled
+from syncrelay.explain.graph_facts import BundleGraph, GraphSnapshot, InputGraph
 from syncrelay.explain.standing import Standing
 from syncrelay.explain.suggester import Suggester
 from syncrelay.explain.unneeded import DropFates, drop_fates, may_set_pace
@@ -109,9 +109,7 @@ class Around(TypedDict, total=False):
     is_look: bool
     inactive: str | None
     lapses: Sequence[Lapse]
-    unbundled: Unbundled | None
-    bundle: str | None
-    bundle_subscribers: Sequence[Endpoint]
+    bundle: BundleGraph | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,12 +176,8 @@ class GroupFacts:
     """The last sets that were given up because they could not be transformed."""
     inactive: str | None = None
     """The name of a managed node that waits to be activated."""
-    unbundled: Unbundled | None = None
-    """Why its sets do not leave as one message each, where they should."""
-    bundle: str | None = None
-    """The topic on which its sets leave as one message each, as the graph names it."""
-    bundle_subscribers: Sequence[Endpoint] = ()
-    """Who takes these messages."""
+    bundle: BundleGraph | None = None
+    """What there is around the topic on which its sets leave as one message each, if they do."""
     standing: Standing = Standing.ENOUGH
     """How many of the possible sets leave."""
 

@@ -138,8 +138,16 @@ def serving(graph: InputGraph, type_name: str | None) -> Sequence[Endpoint]:
     return [each for each in graph.publishers if each.type == type_name and not each.mismatch]
 
 
-class Unbundled(NamedTuple):
-    """Why the sets of a group do not leave as one message each, and whether they leave in no other way."""
+class BundleGraph(NamedTuple):
+    """What the graph shows around the topic on which the sets of a group leave as one message each.
 
-    refusal: Refusal
-    is_alone: bool
+    `is_alone` says that they leave in no other way, `refusal` why they do not leave in this one. The others are as
+    those of InputGraph.
+    """
+
+    name: str
+    is_alone: bool = False
+    refusal: Refusal | None = None
+    subscribers: tuple[Endpoint, ...] = ()
+    rivals: tuple[Endpoint, ...] = ()
+    rivals_since: int = 0

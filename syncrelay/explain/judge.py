@@ -99,6 +99,7 @@ _OTHER_RULES: Final[tuple[Rule, ...]] = (
     of_each_input(Code.SUBSCRIBER_QOS, rules_graph.subscriber_qos),
     Rule(Code.SUBSCRIBER_QOS, rules_graph.bundle_subscriber_qos),
     of_each_input(Code.OUTPUT_TAKEN, rules_graph.output_taken),
+    Rule(Code.OUTPUT_TAKEN, rules_graph.bundle_taken),
 )
 _FEW_SETS: Final = Rule(Code.FEW_SETS, rules_matching.few_sets)
 

@@ -9,7 +9,7 @@ from syncrelay.explain import words
 from syncrelay.explain.codes import Severity
 from syncrelay.explain.facts import NO_SECOND, GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Fault, Found, absence, blocks
-from syncrelay.explain.graph_facts import Endpoint, GraphSnapshot, Refusal, serving
+from syncrelay.explain.graph_facts import BundleGraph, Endpoint, GraphSnapshot, InputGraph, Refusal, serving
 from syncrelay.sync.messages import DropReason
 
 _NO_MESSAGE: Final = 5 * SECOND
@@ -62,9 +62,8 @@ def _what_helps(refusal: Refusal) -> str:
 
 def no_bundle(facts: GroupFacts) -> Found:
     """Find that the sets do not leave as one message each, as they should."""
-    if facts.unbundled is not None:
-        refusal = facts.unbundled.refusal
-        severity = Severity.ERROR if facts.unbundled.is_alone else Severity.WARN
+    if facts.bundle is not None and (refusal := facts.bundle.refusal) is not None:
+        severity = Severity.ERROR if facts.bundle.is_alone else Severity.WARN
         yield Fault(refusal.text.splitlines()[0], _what_helps(refusal), severity)
 
 
@@ -247,8 +246,10 @@ def nobody_listens(facts: GroupFacts) -> Found:
     """Find that a lazy group sleeps, as it should."""
     if facts.asleep:
         outputs = [each for each in facts.inputs if each.graph.publishers] or facts.inputs
-        names = one_of(dict.fromkeys(filter(None, [*(each.output for each in outputs), facts.bundle])))
-        some = any(each.graph.subscribers for each in outputs) or facts.bundle_subscribers
+        subscribers = {each.output: each.graph.subscribers for each in outputs}
+        if facts.bundle is not None:
+            subscribers[facts.bundle.name] = facts.bundle.subscribers
+        names, some = one_of(subscribers), any(subscribers.values())
         who = f"no subscriber of {names} fits what the relay offers" if some else f"nobody subscribes to {names}"
         yield Fault(f"{who}, so this lazy group receives nothing", severity=Severity.OK)
 
@@ -368,14 +369,14 @@ def _or_hold_longer(facts: GroupFacts, index: int) -> str:
 
 def subscriber_qos(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find subscribers of an output that the relay's QoS cannot serve."""
-    if an_input.output != facts.bundle:
+    if facts.bundle is None or an_input.output != facts.bundle.name:
         yield from _unserved(an_input.graph.subscribers, an_input.output, f"{an_input.name}'s publisher")
 
 
 def bundle_subscriber_qos(facts: GroupFacts) -> Found:
     """Find subscribers of the bundle that the relay's QoS cannot serve."""
     if facts.bundle is not None:
-        yield from _unserved(facts.bundle_subscribers, facts.bundle, "`qos` of the bundle")
+        yield from _unserved(facts.bundle.subscribers, facts.bundle.name, "`qos` of the bundle")
 
 
 def _unserved(subscribers: Sequence[Endpoint], output: str, other: str) -> Found:
@@ -390,11 +391,21 @@ def _unserved(subscribers: Sequence[Endpoint], output: str, other: str) -> Found
 
 def output_taken(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find others that publish an output, as a second relay of the same file does."""
-    if an_input.graph.rivals and facts.figures.now - an_input.graph.rivals_since >= _ENDING:
-        they = " and ".join(dict.fromkeys(each.node for each in an_input.graph.rivals))
-        verb, whose = ("publishes", "both") if len(an_input.graph.rivals) == 1 else ("publish", "all")
+    if facts.bundle is None or an_input.output != facts.bundle.name:
+        yield from _taken(facts, an_input.graph, an_input.output, "this output another name with `output: ...`")
+
+
+def bundle_taken(facts: GroupFacts) -> Found:
+    """Find others that publish the topic of the bundle."""
+    if facts.bundle is not None:
+        yield from _taken(facts, facts.bundle, facts.bundle.name, "the bundle another `topic`")
+
+
+def _taken(facts: GroupFacts, graph: InputGraph | BundleGraph, output: str, another: str) -> Found:
+    if graph.rivals and facts.figures.now - graph.rivals_since >= _ENDING:
+        they = " and ".join(dict.fromkeys(each.node for each in graph.rivals))
+        verb, whose = ("publishes", "both") if len(graph.rivals) == 1 else ("publish", "all")
         yield Fault(
-            f"{they} {verb} {an_input.output} too: its subscribers get the messages of {whose}",
-            "stop all publishers but one, or give this output another name with `output: ...`; a node that was killed"
-            " stays in the graph for 20 s",
+            f"{they} {verb} {output} too: its subscribers get the messages of {whose}",
+            f"stop all publishers but one, or give {another}; a node that was killed stays in the graph for 20 s",
         )

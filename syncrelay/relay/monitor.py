@@ -216,9 +216,7 @@ class Monitor:
             empty_graph=None if all(each.publishers for each in shown) else self._empty_graph,
             inactive=self.inactive,
             lapses=batch.lapses,
-            unbundled=self._surroundings.unbundled(binding),
             bundle=self._surroundings.bundle_of(binding),
-            bundle_subscribers=self._surroundings.bundle_subscribers(binding),
         )
         found = judge.judge(facts)
         self._reports[binding.group] = GroupReport(facts, found, batch.last, log)

@@ -3,24 +3,26 @@
 from collections.abc import Hashable, Iterable, Sequence
 from typing import NamedTuple
 
+from syncrelay.config.profile import Profile
 from syncrelay.config.wording import counted
 from syncrelay.dataflow.flow import Unpublished
 from syncrelay.dataflow.observers import Losses, Senders
-from syncrelay.explain import Endpoint, GraphSnapshot, InputGraph, Refusal, Unbundled
+from syncrelay.explain import BundleGraph, Endpoint, GraphSnapshot, InputGraph, Refusal
 from syncrelay.relay import graph
 from syncrelay.relay.bindings import GroupBinding
 from syncrelay.relay.inputs import InputBinding
-from syncrelay.relay.ports import EndpointInfo, Node, Purpose
+from syncrelay.relay.outputs import BundleOutput
+from syncrelay.relay.ports import EndpointInfo, Node, Publisher, Purpose
 from syncrelay.runtime import Runtime
 
 
 class _Around(NamedTuple):
-    """What the graph shows around an input; polled only when the graph has changed."""
+    """What the graph shows around an output; polled only when the graph has changed."""
 
-    output: str
+    name: str
     subscribers: tuple[Endpoint, ...]
     rivals: tuple[Endpoint, ...]
-    alike: tuple[str, ...]
+    rivals_since: int
 
 
 class Surroundings:
@@ -32,9 +34,9 @@ class Surroundings:
         self._runtime = runtime
         self._publishes = purpose is Purpose.RELAY
         self._bindings: frozenset[InputBinding] = frozenset()
-        self._around: dict[InputBinding, _Around] = {}
-        self._takers: dict[GroupBinding, tuple[Endpoint, ...]] = {}
-        self._rivals_since: dict[InputBinding, int] = {}
+        self._around: dict[InputBinding | BundleOutput, _Around] = {}
+        self._alike: dict[InputBinding, tuple[str, ...]] = {}
+        self._rivals_since: dict[InputBinding | BundleOutput, int] = {}
         self._relayed: dict[str, bool] = {}
         self._published: dict[str, tuple[tuple[str, ...], Sequence[EndpointInfo]]] | None = None
 
@@ -42,12 +44,13 @@ class Surroundings:
         """Forget all but these."""
         self._bindings = frozenset(bindings)
         self.forget()
-        self._rivals_since = {each: since for each, since in self._rivals_since.items() if each in self._bindings}
+        kept = {*self._bindings, *(each.output.bundle for each in self._bindings)}
+        self._rivals_since = {each: since for each, since in self._rivals_since.items() if each in kept}
 
     def forget(self) -> None:
         """Poll the graph again for each, as it has changed."""
         self._around.clear()
-        self._takers.clear()
+        self._alike.clear()
         self._relayed.clear()
         self._published = None
 
@@ -62,21 +65,24 @@ class Surroundings:
 
     def of(self, binding: InputBinding, losses: Losses, senders: Senders) -> InputGraph:
         """Return what there is around an input, of whose messages some may not have come."""
-        around = self._around.get(binding)
+        topic, around = binding.topic, self._around.get(binding)
         if around is None:
-            around = self._around[binding] = self._poll(binding)
-        topic = binding.topic
+            publisher, profile = binding.output.publisher, topic.profile
+            if not binding.output.is_separate:
+                publisher, profile = binding.output.bundle.publisher, binding.output.bundle.profile
+            around = self._around[binding] = self._poll(binding, binding.output.topic, publisher, profile)
+            self._alike[binding] = () if topic.publishers else self._topics_alike(topic.name, topic.type)
         return InputGraph(
             name=topic.name,
-            output=around.output,
+            output=around.name,
             publishers=topic.publishers,
             subscribers=around.subscribers,
             rivals=around.rivals,
-            rivals_since=self._rivals_since.get(binding, 0),
-            alike=around.alike,
+            rivals_since=around.rivals_since,
+            alike=self._alike[binding],
             not_importable=topic.not_importable,
             not_readable=binding.output.not_readable,
-            refusal=binding.refusal or _unpublished(binding, around.output),
+            refusal=binding.refusal or _unpublished(binding, around.name),
             lost=losses.recent,
             lost_in_all=losses.total,
             largest=topic.outputs.largest,
@@ -85,29 +91,26 @@ class Surroundings:
             profile=topic.profile,
         )
 
-    def _poll(self, binding: InputBinding) -> _Around:
-        topic, output = binding.topic, self._node.resolve_topic(binding.output.topic)
-        publisher, profile = binding.output.publisher, topic.profile
-        if not binding.output.is_separate:
-            publisher, profile = binding.output.bundle.publisher, binding.output.bundle.profile
-        publishers = self._graph.publishers_of(output)
+    def _poll(
+        self, output: InputBinding | BundleOutput, topic: str, publisher: Publisher | None, profile: Profile | None
+    ) -> _Around:
+        """Ask the graph who takes and who publishes an output, which ours publishes with this QoS."""
+        name = self._node.resolve_topic(topic)
+        publishers = self._graph.publishers_of(name)
         # A node that only observes does not count the relay itself as a rival.
         own = int(publisher is not None) if self._publishes else len(publishers)
         rivals = graph.others(publishers, than=self._node.relay_name, own=own)
-        if rivals:
-            self._rivals_since.setdefault(binding, self._runtime.time_ns())
-        else:
-            self._rivals_since.pop(binding, None)
+        if not rivals:
+            self._rivals_since.pop(output, None)
+        subscribers = self._graph.subscribers_of(name)
         return _Around(
-            output=output,
-            subscribers=graph.as_subscribers(self._graph.subscribers_of(output), profile)
-            if profile is not None
-            else (),
-            rivals=rivals,
-            alike=() if topic.publishers else self._alike(topic.name, topic.type),
+            name,
+            graph.as_subscribers(subscribers, profile) if profile is not None else (),
+            rivals,
+            self._rivals_since.setdefault(output, self._runtime.time_ns()) if rivals else 0,
         )
 
-    def _alike(self, name: str, type_name: str | None) -> tuple[str, ...]:
+    def _topics_alike(self, name: str, type_name: str | None) -> tuple[str, ...]:
         """Return topics that may have been meant; outputs of relays are none."""
         published = self._published
         if published is None:
@@ -129,29 +132,25 @@ class Surroundings:
             self._relayed[name] = any(graph.is_relayed(self._graph, each, name) for each in publishers)
         return self._relayed[name]
 
-    def bundle_of(self, binding: GroupBinding) -> str | None:
-        """Return the name in the graph of the topic on which the sets of a group leave as bundles, if they do."""
-        bundle = binding.group.config.bundle
-        return None if bundle is None else self._node.resolve_topic(bundle.topic)
-
-    def bundle_subscribers(self, binding: GroupBinding) -> tuple[Endpoint, ...]:
-        """Return who takes the bundles of a group."""
-        name, profile = self.bundle_of(binding), binding.bundle.profile
-        if name is None or profile is None:
-            return ()
-        takers = self._takers.get(binding)
-        if takers is None:
-            takers = self._takers[binding] = graph.as_subscribers(self._graph.subscribers_of(name), profile)
-        return takers
-
-    def unbundled(self, binding: GroupBinding) -> Unbundled | None:
-        """Return why the sets of a group do not leave as bundles, where they should."""
-        group, bundle = binding.group, binding.group.config.bundle
-        last = group.unpublished.get(group.bundle_index)
-        refusal = binding.bundle.refusal
-        if refusal is None and bundle is not None and last is not None:
-            refusal = _refused(last, self._node.resolve_topic(bundle.topic), bundle.type)
-        return None if refusal is None else Unbundled(refusal, is_alone=not group.config.options.outputs)
+    def bundle_of(self, binding: GroupBinding) -> BundleGraph | None:
+        """Return what there is around the topic of the bundles of a group, if it has them."""
+        config, shown = binding.group.config.bundle, binding.bundle
+        if config is None:
+            return None
+        around = self._around.get(shown)
+        if around is None:
+            around = self._around[shown] = self._poll(shown, config.topic, shown.publisher, shown.profile)
+        refusal, last = shown.refusal, binding.group.unpublished.get(binding.group.bundle_index)
+        if refusal is None and last is not None:
+            refusal = _refused(last, around.name, config.type)
+        return BundleGraph(
+            around.name,
+            is_alone=not binding.group.config.options.outputs,
+            refusal=refusal,
+            subscribers=around.subscribers,
+            rivals=around.rivals,
+            rivals_since=around.rivals_since,
+        )
 
 
 def _unpublished(binding: InputBinding, output: str) -> Refusal | None:

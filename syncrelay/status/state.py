@@ -83,10 +83,14 @@ def is_ready(state: RelayState) -> bool:
         state.phase in (Phase.RUNNING, Phase.OBSERVING)
         and bool(state.groups)
         and not state.unjudged
-        and all(report.facts.failure is None and report.facts.unbundled is None for report in state.groups)
+        and not any(report.facts.failure or _is_unbundled(report.facts) for report in state.groups)
         and all(_is_served(each) for each in inputs)
         and (state.ready_share is None or all(_gives(report, state.ready_share) for report in state.groups))
     )
+
+
+def _is_unbundled(facts: GroupFacts) -> bool:
+    return facts.bundle is not None and facts.bundle.refusal is not None
 
 
 def _gives(report: GroupReport, least: float) -> bool:
@@ -148,7 +152,7 @@ def group_of(report: GroupReport) -> document.Group:
         queue_size=facts.queue_size,
         tolerance=_tolerance(facts.tolerance),
         max_wait_ms=_ms(facts.max_wait),
-        bundle=facts.bundle,
+        bundle=None if facts.bundle is None else facts.bundle.name,
         sets=figures.sets,
         rate_hz=round(figures.rate_hz, 3),
         possible_hz=round(facts.possible_hz, 3),

@@ -201,3 +201,10 @@ def test_messages_of_another_definition_than_the_bundles_are_refused_with_both(
     player.is_up()
     found = wait_for_finding(relay, "no_bundle", naming=["/camera publishes /own", _HOLDER, ", here RIHS01_"])
     assert len(set(re.findall(r"RIHS01_[0-9a-f]{64}", found["text"]))) == 2
+
+
+def test_who_else_publishes_the_bundles_topic_is_said(sourced: Stage):
+    relay = sourced.relay(config({"front": _group()}, metrics=ANY_PORT))
+    sourced.player({"/front/set": _PAIR}, node="bag")
+    found = wait_for_finding(relay, "output_taken", naming=["/bag publishes /front/set too"])
+    assert "give the bundle another `topic`" in found["suggestion"]

@@ -11,7 +11,7 @@ from waitress.trigger import trigger
 
 from syncrelay.config.listen import Listen
 from syncrelay.errors import ListenError
-from syncrelay.explain import Endpoint, GroupReport, Mismatch, Refusal, Share, Tape, Unbundled
+from syncrelay.explain import BundleGraph, Endpoint, GroupReport, Mismatch, Refusal, Share, Tape
 from syncrelay.status import Phase, Taps, server
 from syncrelay.status.announcement import announced
 from syncrelay.status.server import PATHS_TOLD, Server
@@ -35,7 +35,7 @@ REFUSED = replace(
 )
 UNBUNDLED = replace(
     working(),
-    facts=replace(working().facts, unbundled=Unbundled(Refusal("publish", "/set", "a/msg/B"), is_alone=False)),
+    facts=replace(working().facts, bundle=BundleGraph("/set", refusal=Refusal("publish", "/set", "a/msg/B"))),
 )
 UNFIT = Endpoint("/usb_cam", CAMERA.type, Mismatch("reliability", "best_effort", "reliable"))
 

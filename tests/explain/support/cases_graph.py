@@ -1,6 +1,6 @@
 """What the graph tells: facts that come to a finding, and the nearest that do not."""
 
-from syncrelay.explain import ClockState, Code, Endpoint, GraphSnapshot, Mismatch, Refusal, Unbundled
+from syncrelay.explain import BundleGraph, ClockState, Code, Endpoint, GraphSnapshot, Mismatch, Refusal
 from syncrelay.sync.counts import InputCounts
 from tests.explain.support.cases import AGES, HALF_A_SECOND, LIDAR, ONCE, QUIET, STRANGER, UNFIT, camera
 from tests.explain.support.groups import IMAGE, NOW, S, a_group, a_silent_group, an_input
@@ -30,13 +30,16 @@ FOUND = {
         camera(required=False, refusal=Refusal("subscribe to", "/camera", IMAGE, why="out of memory")), LIDAR
     ),
     "bundles whose package is not there, and nothing else leaves": a_group(
-        unbundled=Unbundled(
-            Refusal("publish", "/set", "rig_msgs/msg/Set", why="No module named 'rig_msgs'\nand more", is_unfit=True),
+        bundle=BundleGraph(
+            "/set",
             is_alone=True,
+            refusal=Refusal(
+                "publish", "/set", "rig_msgs/msg/Set", why="No module named 'rig_msgs'\nand more", is_unfit=True
+            ),
         )
     ),
     "bundles that cannot be made, beside the outputs": a_group(
-        unbundled=Unbundled(Refusal("publish", "/set", "rig_msgs/msg/Set", why="out of memory"), is_alone=False)
+        bundle=BundleGraph("/set", refusal=Refusal("publish", "/set", "rig_msgs/msg/Set", why="out of memory"))
     ),
     "a type that is not installed": a_group(camera(not_importable="no package fancy_msgs\nand more"), LIDAR),
     "a field that the type does not have": a_group(
@@ -106,6 +109,9 @@ FOUND = {
     ),
     "an output that two other nodes publish": a_group(
         camera(rivals=(Endpoint("/bag", IMAGE), Endpoint("/old", IMAGE)), rivals_since=NOW - 9 * S), LIDAR
+    ),
+    "a bundle that another node publishes": a_group(
+        bundle=BundleGraph("/set", rivals=(Endpoint("/bag", IMAGE),), rivals_since=NOW - 3 * S)
     ),
     "all inputs that fell silent together": a_silent_group(
         camera(figures=QUIET), an_input("/lidar", figures={**QUIET, "last_received": NOW - 8 * S})
