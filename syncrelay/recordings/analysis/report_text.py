@@ -120,7 +120,7 @@ def suggestion_lines(each: GroupAnalysis) -> Iterator[str]:
         for reason in dict.fromkeys(f"{change.key}: {change.reason}" for change in suggestion.changes):
             yield f"    # {reason}"
     elif suggestion.possible:
-        yield "  suggestion: none, no better values were found"
+        yield "  suggestion: none, no better values of the whole group were found"
 
 
 def _sets(each: GroupAnalysis) -> str:
