@@ -6,7 +6,8 @@ that its new place needs. Once one of the largest alignment has been copied, the
 """
 
 from array import array
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
 from struct import Struct, error
 from typing import Final, NamedTuple
 
@@ -16,23 +17,18 @@ from syncrelay.cdr_walk import MOST_VALUES, Body, FieldsOf, Lying, Walk, alignme
 ENCAPSULATION: Final = b"\0\1\0\0"
 """Of little-endian plain CDR."""
 
+_BODY_AT: Final = len(ENCAPSULATION)
 _NS_PER_SECOND: Final = 1_000_000_000
 _STAMP: Final = Struct("<iI")
 _ORDER, _ALIGNMENT = "<", 8
 _ARRAYS: Final = {2: "H", 4: "I", 8: "Q"}
+_ZEROS: Final = memoryview(bytes(_ALIGNMENT))
+# What pieces are of: the body, zeros, or the stamp that takes the place of another.
+_OWN, _PADDING, _GIVEN = range(3)
 
 
 class UnfitError(Exception):
     """A payload that is not a message of the type that its field has."""
-
-
-class _Field(NamedTuple):
-    """A field of the type: what walks over a value, its largest alignment, and the place of its default value."""
-
-    walk: Walk
-    alignment: int
-    begin: int
-    end: int
 
 
 class Assembler:
@@ -44,13 +40,12 @@ class Assembler:
         Raises UnreadableFieldError for a type with a field that has no plain layout, and UnfitError for a default that
         is not of the type.
         """
-        self._default = _body(default, type_name)
+        body, place = _body(default, type_name), 0
         self._fields: dict[str, _Field] = {}
-        place = 0
         for name, each in fields_of(type_name).items():
             walk, begin = walk_of(fields_of, each), place
-            place = _end(walk, self._default, begin, name)
-            self._fields[name] = _Field(walk, alignment_of(fields_of, each), begin, place)
+            place = _end(walk, body, begin, name)
+            self._fields[name] = _Field(name, walk, alignment_of(fields_of, each), (body, begin, place))
 
     def assemble(
         self, contents: Mapping[str, Payload], *, stamp: int | None = None, stamped: Collection[str] = ()
@@ -61,23 +56,130 @@ class Assembler:
         payload is left out: Fast DDS pads payloads, and rmw_serialize leaves as many bytes as it estimated too many.
         Raises UnfitError for a payload that is no message of its field's type.
         """
-        parts = _Parts()
+        parts: list[bytes | memoryview] = [ENCAPSULATION]
+        given = None if stamp is None else memoryview(_STAMP.pack(*divmod(stamp, _NS_PER_SECOND)))
+        size = 0
         for name, field in self._fields.items():
-            content = contents.get(name)
-            if content is None:
-                parts.append(name, field, self._default, field.begin, field.end)
-                continue
-            body = _body(content, name)
-            end = _end(field.walk, body, 0, name)
-            first = len(parts.content)
-            parts.append(name, field, body, 0, end)
-            if stamp is not None and name in stamped:
-                parts.overwrite(first, _STAMP.pack(*divmod(stamp, _NS_PER_SECOND)))
-        return b"".join([ENCAPSULATION, *parts.content])
+            payload = contents.get(name)
+            if payload is None:
+                value = field.default(size % _ALIGNMENT)
+                parts.append(value)
+                size += len(value)
+            else:
+                own = given if name in stamped else None
+                layout = field.layout(payload, size % _ALIGNMENT, is_stamped=own is not None)
+                parts += _cut(layout.pieces, memoryview(payload)[_BODY_AT:], own)
+                size += layout.size
+        return b"".join(parts)
 
 
-def _body(content: Payload, name: str) -> Body:
-    body = Body.of(content)
+class _Piece(NamedTuple):
+    """Bytes of a value, from a place to another of what `source` names; numbers of so many bytes are `swapped`."""
+
+    source: int
+    begin: int
+    end: int
+    swapped: int = 0
+
+
+def _cut(pieces: Iterable[_Piece], body: memoryview, stamp: memoryview | None) -> Iterator[bytes | memoryview]:
+    sources = body, _ZEROS, stamp or _ZEROS
+    for source, begin, end, swapped in pieces:
+        content = sources[source][begin:end]
+        yield _swapped(content, swapped) if swapped else content
+
+
+class _Field:
+    """A field of the type: how its value is cut out of payloads, and its value where none is given."""
+
+    def __init__(self, name: str, walk: Walk, alignment: int, default: tuple[Body, int, int]) -> None:
+        """Take the walk over a value, its largest alignment, and where a body has the default value."""
+        self._name, self._walk, self._alignment, self._default = name, walk, alignment, default
+        self._defaults: dict[int, bytes] = {}
+        self._last: _Layout | None = None
+
+    def default(self, phase: int) -> bytes:
+        """Return the default value, as it is so many bytes behind a multiple of 8."""
+        if phase not in self._defaults:
+            body, begin, end = self._default
+            self._defaults[phase] = b"".join(_cut(self._pieces(body, begin, end, phase), body.content, None))
+        return self._defaults[phase]
+
+    def layout(self, payload: Payload, phase: int, *, is_stamped: bool) -> "_Layout":
+        """Return how to cut a payload, with its own stamp or another, for a place so many bytes behind a multiple of 8.
+
+        Raises UnfitError.
+        """
+        key = len(payload), bytes(payload[:2]), phase, is_stamped
+        last = self._last
+        if last is None or not last.fits(key, payload):
+            body = _body(payload, self._name)
+            end = _end(self._walk, body, 0, self._name)
+            pieces = self._pieces(body, 0, end, phase)
+            last = _Layout(_with_stamp(pieces, phase) if is_stamped else pieces, key, body)
+            self._last = last
+        return last
+
+    def _pieces(self, body: Body, begin: int, end: int, phase: int) -> Sequence[_Piece]:
+        """Return what makes the value that takes these bytes of a body, with the padding before it."""
+        pieces: list[_Piece] = []
+        may_keep = body.order == _ORDER and body.alignment == _ALIGNMENT
+        if not may_keep or (begin - phase) % self._alignment:
+            copied = _Copied(body, pieces, phase, self._alignment if may_keep else 0)
+            try:
+                begin = self._walk(copied, begin)
+            except _InPlace as rest:
+                begin = rest.begin
+            except Lying:
+                raise UnfitError(f"{self._name} has more than {MOST_VALUES} values to be put in other places") from None
+        return [*pieces, _Piece(_OWN, begin, end)] if begin < end else pieces
+
+
+class _Layout:
+    """How payloads are cut that are alike.
+
+    In CDR all is where the lengths of the strings and sequences before it put it. So what was found of one message
+    holds for each that has the same lengths in the same places.
+    """
+
+    __slots__ = ("_ends", "_key", "_order", "_read", "_values", "pieces", "size")
+
+    def __init__(self, pieces: Sequence[_Piece], key: Hashable, body: "_Measured") -> None:
+        """Take what the pieces depend on beside lengths, and a body that was walked over."""
+        self.pieces: Final = pieces
+        self.size: Final = sum(each.end - each.begin for each in pieces)
+        self._key, self._order = key, body.order
+        self._ends, self._values = tuple(body.lengths), tuple(body.lengths.values())
+        self._read: Struct | None = None
+
+    def fits(self, key: Hashable, payload: Payload) -> bool:
+        """Whether a payload is alike."""
+        if key != self._key:
+            return False
+        if self._read is None:
+            # Not before: where sizes differ from message to message, it is never asked for.
+            ends = pairwise((-_BODY_AT, *self._ends))
+            self._read = Struct(self._order + "".join(f"{end - before - 4}xI" for before, end in ends))
+        return self._read.unpack_from(payload) == self._values
+
+
+class _Measured(Body):
+    """A body that keeps the lengths which were read, by the places where they end."""
+
+    __slots__ = ("lengths",)
+
+    def __init__(self, content: memoryview, order: str, alignment: int) -> None:
+        super().__init__(content, order, alignment)
+        self.lengths: dict[int, int] = {}
+
+    def length(self, place: int) -> tuple[int, int]:
+        count, end = super().length(place)
+        self.lengths[end] = count
+        return count, end
+
+
+def _body(content: Payload, name: str) -> _Measured:
+    body = _Measured.of(content)
     if body is None:
         raise UnfitError(f"{name} is not plain CDR")
     return body
@@ -92,41 +194,16 @@ def _end(walk: Walk, body: Body, place: int, name: str) -> int:
     return end
 
 
-class _Parts:
-    """The body of a message as far as it was made."""
-
-    def __init__(self) -> None:
-        self.content: list[bytes | memoryview] = []
-        self.size = 0
-
-    def append(self, name: str, field: _Field, body: Body, begin: int, end: int) -> None:
-        """Add a value that takes these bytes of a body, with the padding before it."""
-        may_keep = body.order == _ORDER and body.alignment == _ALIGNMENT
-        if not may_keep or (begin - self.size) % field.alignment:
-            copied = _Copied(body, self, field.alignment if may_keep else 0)
-            try:
-                begin = field.walk(copied, begin)
-            except _InPlace as rest:
-                begin = rest.begin
-            except Lying:
-                raise UnfitError(f"{name} has more than {MOST_VALUES} values to be put in other places") from None
-        self.add(body.content[begin:end])
-
-    def add(self, content: bytes | memoryview) -> None:
-        """Add bytes."""
-        if len(content):
-            self.content.append(content)
-            self.size += len(content)
-
-    def overwrite(self, index: int, stamp: bytes) -> None:
-        """Put a stamp in the place of the one that begins a value, whose first part has this index."""
-        rest = self.content[index:]
-        # What was before this value, to find what aligns it.
-        gap = -(self.size - sum(map(len, rest))) % 4
-        left, self.content[index:] = bytes(gap) + stamp, []
-        for part in rest:
-            self.content += (left[: len(part)], part[len(left) :])
-            left = left[len(part) :]
+def _with_stamp(pieces: Sequence[_Piece], phase: int) -> Sequence[_Piece]:
+    """Return a value's pieces with another stamp in the place of the one that begins it."""
+    gap = -phase % 4
+    before, left = gap + _STAMP.size, []
+    for each in pieces:
+        begin = min(each.end, each.begin + before)
+        before -= begin - each.begin
+        if begin < each.end:
+            left.append(each._replace(begin=begin))
+    return [_Piece(_PADDING, 0, gap), _Piece(_GIVEN, 0, _STAMP.size), *left]
 
 
 class _InPlace(Exception):  # noqa: N818  no error
@@ -140,13 +217,12 @@ class _InPlace(Exception):  # noqa: N818  no error
 class _Copied(Body):
     """A body whose values are copied as they are walked over. Raises _InPlace once the rest can stay as it is."""
 
-    __slots__ = ("_alignment", "_parts")
+    __slots__ = ("_alignment", "_pieces", "_size")
 
-    def __init__(self, body: Body, parts: _Parts, alignment: int) -> None:
-        """Take the largest alignment of the values, 0 where all have to be copied."""
+    def __init__(self, body: Body, pieces: list[_Piece], size: int, alignment: int) -> None:
+        """Take where pieces go, how many bytes lie before them, and the largest alignment; 0 where all are copied."""
         super().__init__(body.content, body.order, body.alignment)
-        self._parts = parts
-        self._alignment = alignment
+        self._pieces, self._size, self._alignment = pieces, size, alignment
 
     def run(self, place: int, size: int, count: int) -> int:
         end = super().run(place, size, count)
@@ -160,11 +236,15 @@ class _Copied(Body):
 
     def _copy(self, end: int, size: int, count: int) -> None:
         """Copy primitives of one size that end here."""
-        self._parts.add(bytes(-self._parts.size % size))
-        content = self.content[end - size * count : end]
-        self._parts.add(content if self.order == _ORDER or size == 1 else _swapped(content, size))
-        if self._alignment and not (end - self._parts.size) % self._alignment:
+        self._add(_Piece(_PADDING, 0, -self._size % size))
+        self._add(_Piece(_OWN, end - size * count, end, 0 if self.order == _ORDER or size == 1 else size))
+        if self._alignment and not (end - self._size) % self._alignment:
             raise _InPlace(end)
+
+    def _add(self, piece: _Piece) -> None:
+        if piece.begin < piece.end:
+            self._pieces.append(piece)
+            self._size += piece.end - piece.begin
 
     def repeat(self, place: int, walk: Walk, count: int, *, is_fixed: bool) -> int:  # noqa: ARG002  all are copied
         for _ in range(count):

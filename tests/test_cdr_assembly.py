@@ -104,6 +104,22 @@ def test_any_bytes_are_a_field_or_refused(body, kind):
     assert assembled.endswith(_DEFAULT[-5:])
 
 
+def test_messages_of_one_size_whose_lengths_differ_are_cut_where_they_say():
+    types = {"a/Set": {"names": "a/Names", "low": "uint16"}, "a/Names": {"one": "string", "other": "sequence<uint16>"}}
+    assembler = Assembler(types.__getitem__, "a/Set", b"\0\1\0\0" + struct.pack("<I4sIH", 1, b"", 0, 7))
+
+    def names(one: bytes, count: int) -> bytes:
+        padding = bytes(-len(one) % 4)
+        body = struct.pack("<I", len(one)) + one + padding + struct.pack(f"<I{count}H", count, *range(count))
+        return body + bytes(24 - len(body))
+
+    for one, count in 2 * [(b"abc\0", 2), (b"a\0", 1), (b"abcdefg\0", 3), (b"a\0", 4)]:
+        payload = names(one, count)
+        assembled = assembler.assemble({"names": b"\0\1\0\0" + payload})
+        end = 4 + len(one) + -len(one) % 4 + 4 + 2 * count
+        assert assembled == b"\0\1\0\0" + payload[:end] + b"\x07\0"
+
+
 def test_a_type_with_a_wstring_is_refused():
     with pytest.raises(UnreadableFieldError, match="wstring has no plain layout"):
         Assembler({"a/Set": {"text": "wstring"}}.__getitem__, "a/Set", _DEFAULT)
@@ -158,7 +174,16 @@ def test_drawn_types_and_messages_are_byte_for_byte_what_is_serialized():
                 contents[field] = bytes(store.serialize_cdr(message, type_name, little_endian=is_little)) + padding
                 setattr(expected, field, message)
         serialized = bytes(store.serialize_cdr(expected, name))
-        assert assembler.assemble(contents) == serialized, f"type {number} of seed 32: {store.generate_msgdef(name)[0]}"
+        # Again after others: what was kept of one message must not be taken for another's.
+        others = {
+            field: bytes(store.serialize_cdr(getattr(drawn_message(store, name, chance), field), members[field]))
+            for field in contents
+        }
+        for payloads in (contents, others, contents):
+            assembled = assembler.assemble(payloads)
+            assert payloads is others or assembled == serialized, (
+                f"type {number} of seed 32: {store.generate_msgdef(name)[0]}"
+            )
         n_given, n_left = n_given + len(contents), n_left + len(members) - len(contents)
     assert n_given > 2 * n_drawn
     assert n_left > n_drawn / 2
