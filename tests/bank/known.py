@@ -4,22 +4,29 @@ import contextlib
 import hashlib
 import json
 import random
-from dataclasses import replace
+from array import array
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from syncrelay.config import ConfigError
-from syncrelay.explain import CauseLog, ClockState, Finding, GroupFacts, GroupReport, explanation, with_ok
+from syncrelay.explain import CauseLog, ClockState, Distribution, Finding, GroupFacts, GroupReport, explanation, with_ok
 from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.troubles import troubles
 from syncrelay.status.state import group_of
+from tests.bank.any_facts import said_of
 from tests.bank.kinds import KINDS
 from tests.bank.play import Drawn, drawn, publishers_of
 from tests.bank.rig import S
 from tests.explain.scenario import Source, run
 from tests.explain.scenario import group_of as scenario_group_of
+
+# A block of any facts has so many draws.
+_AT_ONCE: Final = 25
 
 KNOWN: Final = Path(__file__).with_name("known.txt")
 """Of each draw a block that begins with its name: a line that is added, as `8 tai varied`, is one draw more."""
@@ -109,8 +116,21 @@ def fixed() -> list[Fixed]:
 
 
 def known(fixed: Fixed) -> str:
-    """Write down when the code of what explains most changed, with its words, and a digest of all that is shown."""
+    """Write down what is known of a draw: of any facts how often each code is found, and a digest of all that is said.
+
+    Of others when the code of what explains most changed, with its words, and digests of all shown and all observed.
+    """
+    if fixed.kinds == "facts":
+        codes, digest = Counter[str](), hashlib.sha256()
+        for number in range(fixed.seed * _AT_ONCE, (fixed.seed + 1) * _AT_ONCE):
+            for code, text in said_of(random.Random(f"facts {number}")):
+                codes[code] += 1
+                digest.update(text.encode())
+        return "\n".join(
+            [fixed.name, ", ".join(f"{code} {codes[code]}" for code in sorted(codes) if code), digest.hexdigest()[:12]]
+        )
     draw, lines, digest, before, log = fixed.drawn(), [fixed.name], hashlib.sha256(), "", CauseLog()
+    observed = hashlib.sha256()
     sources, options, beside = draw.sources, draw.rig.options, dict[str, Any](stops=draw.rig.stops)
     if fixed.is_varied:
         words, sources, options, more = _varied(draw, random.Random(fixed.name))
@@ -127,11 +147,28 @@ def known(fixed: Fixed) -> str:
         logged = [line.text for line in log.lines(now=facts.figures.now)]
         told = [each.text for each in troubles([(facts, found)], log.published_by)]
         digest.update(json.dumps([group_of(GroupReport(facts, found)).as_dict(), logged, told]).encode())
+        observed.update(str(_plain(facts)).encode())
 
     shown = publishers_of(draw.rig.flows)
     seconds = int(draw.seconds) + 1
     run(*sources, seconds=seconds, options=options, publishers=shown, looks=draw.looks, hears=hears, **beside)
-    return "\n".join([*lines, digest.hexdigest()[:12]])
+    return "\n".join([*lines, f"{digest.hexdigest()[:12]} {observed.hexdigest()[:12]}"])
+
+
+def _plain(value: Any) -> Any:
+    """Return facts as lists of numbers and texts, alike wherever they were made."""
+    match value:
+        case Distribution():
+            return [*value.newest(len(value))]
+        case float():
+            return f"{value:.9g}"
+        case array():
+            return value.tolist()
+        case Mapping():
+            return [_plain(each) for each in value.items()]
+        case tuple() | list():
+            return [*value] if value and isinstance(value[0], int) else [_plain(each) for each in value]
+    return [_plain(getattr(value, each.name)) for each in fields(value) if each.repr] if is_dataclass(value) else value
 
 
 def _on_a_grid(draw: Drawn, chance: random.Random) -> str:

@@ -1,0 +1,196 @@
+"""Groups of drawn facts: those of known cases, in which some are others of the cases, or near to them.
+
+No rig is played, so thousands are judged in a second; and what no rig comes to, its limits too, is among them.
+"""
+
+import random
+from collections.abc import Callable, Iterator
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, Final, TypeAlias
+
+from syncrelay.config import Tolerance
+from syncrelay.explain import (
+    CauseLog,
+    Distribution,
+    FindingLog,
+    GroupFacts,
+    GroupFigures,
+    GroupReport,
+    InputFacts,
+    InputFigures,
+    Judge,
+    RecentDrop,
+    Share,
+    with_ok,
+)
+from syncrelay.explain.epochs import Reading
+from syncrelay.explain.troubles import troubles
+from syncrelay.status.state import group_of
+from syncrelay.sync.messages import DropReason
+from tests.explain.support import cases_flow, cases_graph, cases_stamps, cases_transforms
+from tests.explain.support.groups import BEGAN, MS, S
+
+Pool: TypeAlias = dict[tuple[type, str], list[Any]]
+
+_CASES: Final = [
+    facts
+    for module in (cases_graph, cases_stamps, cases_flow, cases_transforms)
+    for facts in (*module.FOUND.values(), *(each for cases in module.QUIETLY.values() for each in cases.values()))
+]
+# What is a time lies near those of the cases, what is a duration does not.
+_TIME: Final = BEGAN // 2
+_ROUND: Final = (
+    0,
+    1,
+    MS,
+    5 * MS,
+    20 * MS,
+    100 * MS,
+    *(n * S // 2 for n in (1, 2, 3, 4, 6, 10, 16, 20, 30, 40, 60, 120)),
+)
+_COUNTS: Final = (0, 1, 2, 3, 4, 5, 9, 10, 11, 19, 20, 50, 94, 95, 99, 100)
+_LOOKS: Final = 6
+_MOST: Final = 6
+_CHANGES: Final = 0.3
+# As long as another, and what is no more than a few: the index of an input.
+_AS_LONG: Final = frozenset({"missing", "sets_since_without", "spans", "latencies"})
+_AS_IN_CASES: Final = frozenset({"trigger", "pacemaker", "unsteady", "every", "name", "required"})
+# What files may ask for, and no case has.
+_MORE: Final[Pool] = {
+    (GroupFacts, "every"): [2, 5],
+    (GroupFacts, "least_period"): [S, 100 * MS],
+    (InputFacts, "narrowed"): [Tolerance("tolerance", 4 * MS), Tolerance("tolerance", 30 * MS)],
+    (InputFacts, "own_tolerance"): [Tolerance("max_age", 50 * MS), Tolerance("max_age", S)],
+    (InputFacts, "in_quorum"): [True],
+    (InputFacts, "required"): [True, False],
+    (InputFigures, "resolution"): [10 * MS, S],
+    (InputFigures, "reading"): [Reading("run twice as fast", 2.0), Reading("hold microseconds", is_unit=True)],
+}
+
+
+def any_facts(chance: random.Random) -> Iterator[list[GroupFacts]]:
+    """Yield what is known of some groups, look by look."""
+    base = chance.choice(_CASES)
+    groups = [replace(_some_changed(base, chance), name=f"g{n}") for n in range(chance.choice([1, 1, 2, 3, _MOST]))]
+    for _ in range(_LOOKS):
+        yield [replace(each, figures=replace(each.figures, shares=_same_share(each))) for each in groups]
+        by = chance.choice([S, S, 2 * S, 5 * S, 10 * S, 61 * S])
+        step: Callable[[GroupFacts, int], Any] = chance.choice([_waits, _goes_on, _goes_on, _goes_on])
+        groups = [_some_changed(each, chance) if chance.random() < _CHANGES else each for each in groups]
+        groups = [step(each, by) for each in groups]
+
+
+def _same_share(facts: GroupFacts) -> Callable[[int], Share]:
+    return lambda _since: facts.figures.share
+
+
+def said_of(chance: random.Random) -> Iterator[tuple[str, str]]:
+    """Yield all that is said of such groups, with the codes of findings."""
+    judges, logs, causes = [Judge() for _ in range(_MOST)], [FindingLog() for _ in range(_MOST)], CauseLog()
+    for groups in any_facts(chance):
+        found = [judge.judge(facts) for judge, facts in zip(judges, groups, strict=False)]
+        now = max(facts.figures.now for facts in groups)
+        causes.watch([facts.name for facts in groups])
+        for judge, log, facts, each in zip(judges, logs, groups, found, strict=False):
+            causes.hear(facts, each, [*log.remarks(facts, each, judge.explained(facts))], now=now)
+            yield from ((one.code.value, str(one)) for one in with_ok(facts, each))
+            last = [RecentDrop(index, now, chance.choice(list(DropReason))) for index in range(len(facts.inputs))]
+            yield "", str(group_of(GroupReport(facts, each, last, log)).as_dict())
+        yield from (("", line.text) for line in causes.lines(now=now))
+        yield from (("", str(each)) for each in troubles([*zip(groups, found, strict=True)], causes.published_by))
+
+
+def _parts(value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the fields of a record, none of other values."""
+    if is_dataclass(value):
+        yield from ((each.name, getattr(value, each.name)) for each in fields(value) if each.repr)
+    elif hasattr(value, "_fields"):
+        yield from zip(value._fields, value, strict=True)
+
+
+def _with(value: Any, name: str, part: Any) -> Any:
+    return value._replace(**{name: part}) if hasattr(value, "_replace") else replace(value, **{name: part})
+
+
+def _collect(value: Any, pool: Pool) -> Pool:
+    """Note which values each field has."""
+    for name, part in _parts(value):
+        seen = pool.setdefault((type(value), name), [*_MORE.get((type(value), name), ())])
+        if part not in seen:
+            seen.append(part)
+        for each in part if isinstance(part, tuple) and not hasattr(part, "_fields") else [part]:
+            _collect(each, pool)
+    return pool
+
+
+def _some_changed(facts: GroupFacts, chance: random.Random) -> GroupFacts:
+    for _ in range(chance.randint(0, 4)):
+        facts = _changed(facts, chance)
+    if not any(each.required for each in facts.inputs):
+        facts = replace(facts, inputs=(replace(facts.inputs[0], required=True), *facts.inputs[1:]))
+    return facts
+
+
+def _changed(value: Any, chance: random.Random) -> Any:
+    """Return a record with one of its values, or of those in it, another."""
+    name, part = chance.choice([*_parts(value)])
+    if isinstance(part, tuple) and not hasattr(part, "_fields") and part and [*_parts(part[0])]:
+        at = chance.randrange(len(part))
+        return _with(value, name, (*part[:at], _changed(part[at], chance), *part[at + 1 :]))
+    if [*_parts(part)] and (isinstance(part, GroupFigures) or chance.random() < 0.9):
+        return _with(value, name, _changed(part, chance))
+    is_near = name in _AS_LONG or (name not in _AS_IN_CASES and chance.random() < 0.5)
+    other = _near(part, chance, is_as_long=name in _AS_LONG) if is_near else chance.choice(_POOL[type(value), name])
+    return _with(value, name, other)
+
+
+def _near(value: Any, chance: random.Random, *, is_as_long: bool = False) -> Any:
+    """Return another value near one: of many, each near to its own, or fewer of them."""
+    match value:
+        case Distribution():
+            kept = value.newest(len(value) if is_as_long else chance.choice(_COUNTS))
+            return Distribution([_number_near(each, chance) for each in kept])
+        case dict():
+            return {key: _number_near(each, chance) for key, each in value.items()}
+        case tuple() | list() if not hasattr(value, "_fields"):
+            if is_as_long or chance.random() < 0.5:
+                return tuple(_number_near(each, chance) for each in value)
+            return value[: chance.randrange(len(value) + 1)]
+    return _number_near(value, chance)
+
+
+def _number_near(value: Any, chance: random.Random) -> Any:
+    match value:
+        case bool():
+            return not value
+        case int() if value > _TIME:
+            return value + chance.choice([-1, 0, 1]) + chance.choice([-1, 1]) * chance.choice(_ROUND)
+        case int():
+            return chance.choice([-value, 2 * value, value // 2, value + 1, value - 1, *_ROUND, *_COUNTS])
+        case float():
+            return value * chance.choice([0, 0.05, 0.25, 0.5, 0.7, 0.8, 0.85, 0.95, 1.05, 2, 4])
+    return value
+
+
+def _waits(facts: GroupFacts, by: int) -> GroupFacts:
+    """Let time pass in which nothing comes."""
+    return replace(facts, figures=replace(facts.figures, now=facts.figures.now + by))
+
+
+def _goes_on(value: Any, by: int) -> Any:
+    """Let time pass in which all goes on as it did."""
+    if isinstance(value, int):
+        return value + by if value > _TIME else value
+    if parts := [*_parts(value)]:
+        moved = {name: new for name, part in parts if (new := _goes_on(part, by)) is not part}
+        if not moved:
+            return value
+        return value._replace(**moved) if hasattr(value, "_replace") else replace(value, **moved)
+    if isinstance(value, tuple | list) and value and (not isinstance(value[0], int) or value[0] > _TIME):
+        return type(value)(_goes_on(each, by) for each in value)
+    return value
+
+
+_POOL: Final[Pool] = {}
+for _each in _CASES:
+    _collect(_each, _POOL)
