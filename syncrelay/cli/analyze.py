@@ -98,7 +98,7 @@ def _analyze(bag: str, arguments: Namespace, text: str | None, topics: tuple[str
     Raises ConfigError for a faulty file, BagError for a recording that cannot be read.
     """
     from syncrelay.cli.reading import reading, tell_faults
-    from syncrelay.recordings.analysis import analyze, inventory, with_suggestions
+    from syncrelay.recordings.analysis import analyze, find_all, inventory, with_suggestions
     from syncrelay.recordings.analysis.proposal import bind_file_or_topics
     from syncrelay.recordings.analysis.report_json import inventory_as_json
     from syncrelay.recordings.analysis.report_text import inventory_lines
@@ -123,6 +123,7 @@ def _analyze(bag: str, arguments: Namespace, text: str | None, topics: tuple[str
             analysis = analyze(recording, text, bindings)
             if file is None:
                 analysis = with_suggestions(analysis)
+            find_all(analysis)
     _give(name, analysis, arguments, indent=indent)
     if tell_faults(recording) or not all(binding.is_complete for binding in bindings):
         return AT_FAULT

@@ -1,6 +1,8 @@
 """A group's engine driven through messages in the order of their receipt, each at its time, as the relay drives it."""
 
 from collections.abc import Callable, Iterable, Sequence
+from copy import copy, deepcopy
+from itertools import tee
 from typing import Any, Final, Protocol, TypeAlias
 
 from syncrelay.clock import UNREADABLE
@@ -31,7 +33,9 @@ class EngineDriver:
         """
         self._frames = Frames()
         self.engine: Final = group.engine(None if transforms is None else self._frames)
-        self._transforms = iter(() if transforms is None or group.options.transforms is None else transforms)
+        coming = () if transforms is None or group.options.transforms is None else transforms
+        # Unlike other iterators, these can be copied.
+        (self._transforms,) = tee(coming, 1)
         self._coming = next(self._transforms, None)
         # Else nothing is ever due, and asking for each message costs a tenth of a replay.
         self.has_deadlines: Final = group.has_deadlines
@@ -56,10 +60,18 @@ class EngineDriver:
         self.expire(now)
         self._take([self.engine.reject(Message(index, 0, payload), DropReason.MALFORMED)], now)
 
+    def ahead(self, take: Take) -> "EngineDriver":
+        """Return another driver, which goes on from here by itself and tells someone else."""
+        return deepcopy(self, {id(self._take): take, id(self._transforms): copy(self._transforms)})
+
     def run(self, messages: Iterable[Message]) -> None:
+        """Feed messages, then let all leave that may."""
+        self.finish(self.feed(messages))
+
+    def feed(self, messages: Iterable[Message]) -> int:
         """Add messages whose payload is the time when they were received; count those that are UNREADABLE as malformed.
 
-        Then let all leave that may.
+        Return when the last of them was received, 0 where there is none.
         """
         add, take, now = self.engine.add, self._take, 0
         for message in messages:
@@ -71,7 +83,7 @@ class EngineDriver:
             # Every message would pay for a call between.
             elif outcomes := add(message, now=now):
                 take(outcomes, now)
-        self.finish(now)
+        return now
 
     def expire(self, now: int) -> None:
         """Let what has waited long enough leave, each at its own time, up to `now`; learn what came till then."""

@@ -122,6 +122,11 @@ class Rows:
         for begin in range(0, len(self), BLOCK):
             yield self[begin : begin + BLOCK]
 
+    def lists(self) -> Iterator[list[int]]:
+        """Yield the rows in order as lists."""
+        for block in self.blocks():
+            yield from block.tolist()
+
     def column(self, place: int) -> Column:
         """Return one column, as long as the table is whenever it is asked."""
         return _ColumnOf(self, place)

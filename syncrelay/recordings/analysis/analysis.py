@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import combinations
 
 from syncrelay.config import GroupConfig, load_text
@@ -21,6 +21,7 @@ from syncrelay.recordings.analysis.unneeded import InputFates, Unneeded, find_un
 from syncrelay.recordings.analysis.watching import LastingFinding, watch_group
 from syncrelay.recordings.bag.bindings import GroupBinding
 from syncrelay.recordings.bag.recording import Recording
+from syncrelay.recordings.side_by_side import side_by_side
 
 
 # No slots: what takes long is found when it is first asked for, and kept.
@@ -42,7 +43,7 @@ class GroupAnalysis:
     @cached_property
     def findings(self) -> tuple[LastingFinding, ...]:
         """What the running relay would have found, the worst first: it judges once a second of the recording."""
-        return watch_group(self.group, self.streams, whole=lambda: self.trials)
+        return watch_group(self.group, self.streams, self.evaluation, whole=lambda: self.trials)
 
     @property
     def possible(self) -> PossibleSets | None:
@@ -105,6 +106,14 @@ def analyze(recording: Recording, text: str, bindings: Sequence[GroupBinding]) -
     distinct = {(stream.topic, id(stream)): stream for of_group in streams for stream in of_group}
     topics = tuple(figures_of(stream) for stream in distinct.values() if len(stream.stamps))
     return Analysis(recording.begin, recording.end, topics, groups, text, tuple(recording.faults))
+
+
+def find_all(analysis: Analysis) -> None:
+    """Find what takes long of each group, on all cores."""
+    wanted = [(group, name) for group in analysis.groups for name in ("findings", "curves")]
+    for (group, name), found in zip(wanted, side_by_side([partial(getattr, *each) for each in wanted]), strict=True):
+        # There it is kept when it is first asked for.
+        vars(group)[name] = found
 
 
 def with_suggestions(analysis: Analysis) -> Analysis:

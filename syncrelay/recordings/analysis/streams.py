@@ -2,7 +2,7 @@
 
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import repeat
+from itertools import chain, repeat
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -177,6 +177,11 @@ def read_topics(recording: Recording) -> tuple[tuple[Channel, Stream], ...]:
 
 def messages(streams: Sequence[Stream]) -> Iterator[Message]:
     """Yield the messages of a group's inputs in the order of the recording; the payload is the time of receipt."""
+    return chain.from_iterable(some for _, some in stretches(streams))
+
+
+def stretches(streams: Sequence[Stream]) -> Iterator[tuple[Nanoseconds, Iterator[Message]]]:
+    """Yield the times of receipt of some thousand messages at a time, and those messages."""
     at = [0] * len(streams)
     while any(begin < len(stream.places) for begin, stream in zip(at, streams, strict=True)):
         ends = [begin + _AT_ONCE for begin in at]
@@ -186,20 +191,23 @@ def messages(streams: Sequence[Stream]) -> Iterator[Message]:
         until = min(rest, default=None)
         counts = [len(part) if until is None else int(np.searchsorted(part, until, side="right")) for part in parts]
         among = [slice(begin, begin + count) for begin, count in zip(at, counts, strict=True)]
-        yield from _merged(streams, among, [part[:count] for part, count in zip(parts, counts, strict=True)])
+        yield _merged(streams, among, [part[:count] for part, count in zip(parts, counts, strict=True)])
         at = [each.stop for each in among]
 
 
-def _merged(streams: Sequence[Stream], among: Sequence[slice], places: Sequence[Nanoseconds]) -> Iterator[Message]:
+def _merged(
+    streams: Sequence[Stream], among: Sequence[slice], places: Sequence[Nanoseconds]
+) -> tuple[Nanoseconds, Iterator[Message]]:
     order, inputs = in_order(places)
     parts = list(zip(streams, among, places, strict=True))
     stamps = np.concatenate([stream.stamps[part] for stream, part, _ in parts])[order].tolist()
-    received = np.concatenate([stream.received[part] for stream, part, _ in parts])[order].tolist()
+    received = np.concatenate([stream.received[part] for stream, part, _ in parts])[order]
     keys = keys_in_order([(stream.keys and stream.keys[part], len(at)) for stream, part, at in parts], order)
     frames: Any = keys_in_order([(stream.frames and stream.frames[part], len(at)) for stream, part, at in parts], order)
     if keys is None and frames is None:
-        return map(Message, inputs.tolist(), stamps, received)
-    return map(Message, inputs.tolist(), stamps, received, keys or repeat(None), frames or repeat(None))
+        return received, map(Message, inputs.tolist(), stamps, received.tolist())
+    beside = keys or repeat(None), frames or repeat(None)
+    return received, map(Message, inputs.tolist(), stamps, received.tolist(), *beside)
 
 
 def transforms_beside(streams: Sequence[Stream]) -> RecordedTransforms | None:

@@ -7,9 +7,9 @@ from typing import Final
 from syncrelay.config import GroupConfig, TopicConfig
 from syncrelay.explain import (
     UNREADABLE,
+    Arrivals,
     Code,
     Endpoint,
-    EngineDriver,
     Finding,
     GroupWatch,
     InputGraph,
@@ -17,14 +17,12 @@ from syncrelay.explain import (
     Severity,
 )
 from syncrelay.explain.trials import Trials
-from syncrelay.recordings.analysis.streams import Stream, messages, transforms_beside
-from syncrelay.sync import Match, Message, Outcome
+from syncrelay.recordings.analysis.evaluation import Evaluation
+from syncrelay.recordings.analysis.streams import Stream
 
 _SECOND: Final = 1_000_000_000
 # The start and the end of a recording bring findings that last less long.
 _PASSING: Final = 3
-# Findings speak of the last seconds: fewer than these.
-_CLOSELY: Final = 16
 LASTING_NS: Final = _PASSING * _SECOND
 """Findings that last less long are not told."""
 
@@ -48,99 +46,44 @@ def alike(found: Sequence[LastingFinding]) -> list[list[LastingFinding]]:
 def watch_group(
     group: GroupConfig,
     streams: Sequence[Stream],
+    evaluation: Evaluation,
     *,
-    until: int | None = None,
     whole: Callable[[], Trials] | None = None,
 ) -> tuple[LastingFinding, ...]:
-    """Return what the running relay would have found, judging once a second, the worst and longest first.
+    """Return what the running relay would have found, judging at each look of an evaluation, the worst longest first.
 
-    Where `whole` gives trials on the whole recording, the suggested values are theirs.
-
-    It is judged to the last message, or `until` later than that in nanoseconds of receipt.
-    However long nothing is received, that takes no more than some tens of judgements.
+    Where `whole` gives trials on the whole recording, the suggested values are theirs. What was wrong for no longer
+    than it takes to start or to end is left out.
     """
-    watch = None
-    for message in messages(streams):
-        if watch is None:
-            watch = _Watch(group, streams, began=message.payload, whole=whole)
-        watch.add(message)
-    return () if watch is None else watch.lasting(until)
-
-
-def judged_seconds(seconds: int) -> list[int]:
-    """Return which of so many seconds without a message are judged: first and last ones, between ever fewer.
-
-    When a pause begins and ends, findings come and go; one of years is as one of minutes.
-    """
-    first = range(1, min(seconds, _CLOSELY) + 1)
-    between = (_CLOSELY << times for times in range(1, (max(0, seconds) // _CLOSELY).bit_length()))
-    last = range(max(seconds - _CLOSELY, _CLOSELY) + 1, seconds + 1)
-    return sorted({*first, *between, *last})
-
-
-class _Watch:
-    """Drives a group and watches it, as the running relay does; remembers each finding and for how long it held."""
-
-    def __init__(
-        self, group: GroupConfig, streams: Sequence[Stream], *, began: int, whole: Callable[[], Trials] | None
-    ) -> None:
-        self._sets: list[tuple[tuple[int | None, ...], int]] = []
-        self._driver = EngineDriver(group, self._take, transforms_beside(streams))
-        self._watch = GroupWatch(group, began=began, whole=whole)
-        self._judge_of = Judge()
-        self._due = began + _SECOND
-        self._arrivals: list[list[tuple[int, int]]] = [[] for _ in streams]
-        self._keys: list[Hashable] = [None] * len(streams)
-        self._found: dict[tuple[Code, int | None], LastingFinding] = {}
-        self._graph = [_graph(topic, stream) for topic, stream in zip(group.topics, streams, strict=True)]
-
-    def _take(self, outcomes: Sequence[Outcome], now: int) -> None:
-        for each in outcomes:
-            if isinstance(each, Match):
-                complete = max([message.payload for message in each.messages if message is not None])
-                self._sets.append((each.stamps, now - complete))
-
-    def _judge_until(self, now: int) -> None:
-        """Judge the seconds that end by `now`."""
-        before = 0
-        for second in judged_seconds((now - self._due) // _SECOND + 1):
-            self._judge(self._due + (second - 1) * _SECOND, lasting=second - before)
-            before = second
-        self._due += before * _SECOND
-
-    def add(self, message: Message) -> None:
-        """Judge the seconds that end by when a message was received, then add it."""
-        index, stamp, received = message.input, message.stamp, message.payload
-        if received >= self._due:
-            self._judge_until(received)
-        if message.key is not None:
-            self._keys[index] = message.key
-        if stamp == UNREADABLE:
-            self._driver.reject(index, received, now=received)
-            return
-        self._driver.add(message, now=received)
-        self._arrivals[index].append((stamp, received))
-
-    def lasting(self, until: int | None) -> tuple[LastingFinding, ...]:
-        """Judge to the end, and return what was wrong for longer than it takes to start or to end."""
-        if until is not None and until >= self._due:
-            self._judge_until(until)
-        self._judge(self._due, lasting=1)
-        wrong = (each for each in self._found.values() if each.finding.severity is not Severity.OK)
-        lasting = (each for each in wrong if each.seconds >= _PASSING)
-        return tuple(sorted(lasting, key=lambda each: (-each.finding.severity, -each.seconds)))
-
-    def _judge(self, now: int, *, lasting: int) -> None:
-        self._driver.expire(now)
-        engine = self._driver.engine
-        self._watch.add(self._arrivals, self._sets, engine.counts(), engine.sets, keys=tuple(self._keys), now=now)
-        self._arrivals, self._sets = [[] for _ in self._arrivals], []
-        for finding in self._judge_of.judge(
-            self._watch.facts(self._graph, now=now, is_recorded=True, lapses=tuple(engine.lapses))
-        ):
+    watch, judge = None, Judge()
+    graph = [_graph(topic, stream) for topic, stream in zip(group.topics, streams, strict=True)]
+    fed = [0] * len(streams)
+    keys: list[Hashable] = [None] * len(streams)
+    found: dict[tuple[Code, int | None], LastingFinding] = {}
+    for look, sets in evaluation.seen():
+        watch = watch or GroupWatch(group, began=look.at - _SECOND, whole=whole)
+        came = [slice(before, counts.fed) for before, counts in zip(fed, look.counts, strict=True)]
+        arrivals = [_arrivals(stream, some) for stream, some in zip(streams, came, strict=True)]
+        keys = [_newest_key(stream, some, key) for stream, some, key in zip(streams, came, keys, strict=True)]
+        fed = [some.stop for some in came]
+        watch.add(arrivals, sets, look.counts, look.sets, keys=tuple(keys), now=look.at)
+        for finding in judge.judge(watch.facts(graph, now=look.at, is_recorded=True, lapses=look.lapses)):
             key = (finding.code, finding.input)
-            before = self._found[key].seconds if key in self._found else 0
-            self._found[key] = LastingFinding(finding, before + lasting)
+            before = found[key].seconds if key in found else 0
+            found[key] = LastingFinding(finding, before + look.seconds)
+    wrong = (each for each in found.values() if each.finding.severity is not Severity.OK)
+    lasting = (each for each in wrong if each.seconds >= _PASSING)
+    return tuple(sorted(lasting, key=lambda each: (-each.finding.severity, -each.seconds)))
+
+
+def _arrivals(stream: Stream, some: slice) -> Arrivals:
+    pairs = zip(stream.stamps[some].tolist(), stream.received[some].tolist(), strict=True)
+    return [pair for pair in pairs if pair[0] != UNREADABLE]
+
+
+def _newest_key(stream: Stream, some: slice, before: Hashable) -> Hashable:
+    """Return the newest key of some messages, that of before where none has any."""
+    return next((key for key in reversed((stream.keys or [])[some]) if key is not None), before)
 
 
 def _graph(topic: TopicConfig, stream: Stream) -> InputGraph:

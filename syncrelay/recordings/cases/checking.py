@@ -186,7 +186,7 @@ def _compared(loaded: LoadedCase, group: GroupConfig, found: Sequence[Stream], e
         )
     if expect is None:
         return
-    evaluation = evaluate(group, found)
+    evaluation = evaluate(group, found, until=end)
     yield from _of_bounds(expect, _figures(group, evaluation), path)
     for name, of_input in expect.inputs.items():
         index = loaded.places[name]
@@ -199,7 +199,7 @@ def _compared(loaded: LoadedCase, group: GroupConfig, found: Sequence[Stream], e
                 f"the messages of this case last {lasts / 1e9:.3g} s, so they cannot test `findings`, which are what"
                 f" holds for {LASTING_NS / 1e9:g} s or longer"
             )
-        codes = [each.finding.code.value for each in watch_group(group, found, until=end)]
+        codes = [each.finding.code.value for each in watch_group(group, found, evaluation)]
         codes = list(dict.fromkeys(codes)) or [(Code.HEALTHY if evaluation.sets else Code.STARTING).value]
         if set(codes) != set(expect.findings):
             at = (*path, "findings")

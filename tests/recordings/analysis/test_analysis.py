@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from syncrelay.explain import UNREADABLE, Code
 from syncrelay.recordings.analysis.analysis import analyze_group, group_of
 from syncrelay.recordings.analysis.curves import curves_of
-from syncrelay.recordings.analysis.evaluation import evaluate
+from syncrelay.recordings.analysis.evaluation import evaluate, looked_at
 from syncrelay.recordings.analysis.pairs import pair
 from syncrelay.recordings.analysis.streams import Stream, stamped
 from syncrelay.recordings.analysis.topics import figures_of
-from syncrelay.recordings.analysis.watching import judged_seconds, watch_group
+from syncrelay.recordings.analysis.watching import watch_group
 from syncrelay.sync import DropReason
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
@@ -227,7 +227,8 @@ def test_a_recording_of_a_camera_and_a_lidar_that_are_apart_beside_an_imu_is_giv
 
 
 def _watched(streams):
-    found = watch_group(group_of(_pair_of(), "front"), streams)
+    group = group_of(_pair_of(), "front")
+    found = watch_group(group, streams, evaluate(group, streams))
     return {(each.finding.code.value, each.finding.input): each.seconds for each in found}
 
 
@@ -248,8 +249,8 @@ def test_one_message_of_1970_does_not_keep_the_others_from_being_judged():
 
 
 @given(st.one_of(st.integers(-(2**63), 200), st.integers(0, 2**63)))
-def test_few_seconds_of_a_pause_are_judged_seconds_and_they_stand_for_all(seconds):
-    looks = judged_seconds(seconds)
+def test_few_seconds_of_a_pause_are_looked_at_and_they_stand_for_all(seconds):
+    looks = looked_at(seconds)
     assert looks == sorted(set(looks))
     assert len(looks) <= 32 + 63
     assert looks[:16] == list(range(1, min(16, max(0, seconds)) + 1))

@@ -172,7 +172,7 @@ def test_a_replay_and_an_evaluation_give_what_messages_fed_one_by_one_give(polic
         assert each.fed == each.matched + sum(each.dropped.values()) + each.buffered
         assert each.fed == sum(row[0] == index for row in recording.rows)
         assert each.buffered == 0
-    assert all(each.seconds > 0 for each in watch_group(bindings[0].group, streams))
+    assert all(each.seconds > 0 for each in watch_group(bindings[0].group, streams, evaluation))
 
 
 @given(recording=_recordings(), text=st.sampled_from([*_POLICIES]).flatmap(_groups))

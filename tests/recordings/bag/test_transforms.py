@@ -60,7 +60,8 @@ def evaluated(path):
     with bound(path, text=FILE) as (recording, bindings):
         (streams,) = read_streams(recording, bindings)
         group = bindings[0].group
-        return evaluate(group, streams), watch_group(group, streams)
+        evaluation = evaluate(group, streams)
+        return evaluation, watch_group(group, streams, evaluation)
 
 
 @pytest.mark.parametrize("write", [write_mcap, write_rosbag2, write_ros1])
