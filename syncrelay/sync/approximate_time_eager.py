@@ -53,6 +53,10 @@ class ApproximateTimeEager(Queued):
         self._messages = [queue.messages for queue in self._queues]
         self._in_window = list(zip(self._stamps, self._windows, strict=True))
 
+    @property
+    def at_once(self) -> int:
+        return 0 if self._are_narrowed else self._slop
+
     def for_required(self, required: Sequence[bool], quorum: int) -> tuple["ApproximateTimeEager", OptionalInputs]:
         size, slop, tolerances = self._queue_size, self._slop, self._tolerances
         policy = ApproximateTimeEager(

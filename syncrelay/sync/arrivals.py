@@ -43,6 +43,10 @@ class Arrivals:
             if message is not None and message.stamp > given[message.input]:
                 given[message.input] = message.stamp
 
+    def note_set(self, stamps: Sequence[int]) -> None:
+        """Note the stamps of a set that is newer than all that came before."""
+        self.newest[:] = self._given[:] = stamps
+
     def is_late(self, index: int, stamp: int, *, or_equal: bool) -> bool:
         """Whether a set with this stamp would be older than one that left. `or_equal`: equal stamps are late, too."""
         given = self._given[index]

@@ -50,6 +50,11 @@ class Ledger:
             else:
                 self._dropped[outcome.message.input][outcome.reason] += 1
 
+    def note_sets(self, sets: int) -> None:
+        """Count so many sets, of a new message of each input."""
+        self.sets += sets
+        self.fed[:] = [fed + sets for fed in self.fed]
+
     def forget(self) -> None:
         """Count every message from now on as new, whatever its stamp."""
         self._last = [None] * len(self.fed)

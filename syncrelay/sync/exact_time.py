@@ -31,6 +31,14 @@ class ExactTime(Policy):
         self._order: list[int] = []
         self._losses = Losses(n_inputs)
 
+    @property
+    def at_once(self) -> int:
+        return 0
+
+    @property
+    def is_new(self) -> bool:
+        return not self._order
+
     def for_required(self, required: Sequence[bool], quorum: int) -> tuple["ExactTime", OptionalInputs]:
         stage = OptionalInputs(required=required, quorum=quorum, queue_size=self._queue_size, slop_ns=0)
         return ExactTime(n_inputs=sum(required), queue_size=self._queue_size), stage

@@ -46,6 +46,7 @@ class SyncGroup(Generic[T]):
         "_restamp",
         "_stage",
         "_thinning",
+        "at_once",
     )
 
     def __init__(
@@ -112,6 +113,10 @@ class SyncGroup(Generic[T]):
                 offsets_ns=offsets,
             )
         self._feed = self._matching.feed
+        is_plain = all(required) and not any(offsets) and not self._is_limited
+        is_plain &= self._thinning is None and restamp is None
+        self.at_once = policy.at_once if is_plain else None
+        """How far apart the stamps of what `lend` lets another match may be; None where it always returns None."""
 
     @property
     def sets(self) -> int:
@@ -137,6 +142,24 @@ class SyncGroup(Generic[T]):
         if outcomes:
             outcomes = self._leave(outcomes, now)
         return [*due, *outcomes] if due else outcomes
+
+    def lend(self) -> Sequence[int] | None:
+        """Let another match what comes, until `take_back`; None where what is in here has a part in it.
+
+        It may form sets of one message of each input, that is newer than what came of it before, and no farther from
+        the others than `at_once`; whatever else comes is for the engine, once it was given the messages that are in no
+        set yet. Returned is the newest stamp of each input.
+        """
+        if self.at_once is None or not isinstance(self._matching, Prompt) or not self._matching.is_new:
+            return None
+        return self._newest
+
+    def take_back(self, sets: int, newest: Sequence[int]) -> None:
+        """Match again, after so many sets that another has formed; given are the stamps of the last one."""
+        if not sets:
+            return
+        self._ledger.note_sets(sets)
+        self._arrivals.note_set(newest)
 
     def reject(self, message: Message[T], reason: DropReason) -> Drop[T]:
         """Count a message that cannot be fed: it has no readable stamp."""

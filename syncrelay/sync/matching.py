@@ -27,6 +27,10 @@ class Prompt:
         # The policy's own method: a method between would be called for every message.
         self.feed = self._policy.feed
 
+    @property
+    def is_new(self) -> bool:
+        return self._policy.is_new
+
     def due(self, now: int) -> Sequence[Outcome]:
         return self._policy.advance(now - self._max_wait)
 

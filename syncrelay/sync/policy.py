@@ -37,6 +37,19 @@ class Policy(Protocol):
     n_inputs: int
     """How many inputs a set has."""
 
+    @property
+    def at_once(self) -> int | None:
+        """How far apart in nanoseconds the first messages of all inputs may be to leave as a set with the last of them.
+
+        None where they may have to wait, or where one that is no farther from the others may be dropped.
+        """
+        return None
+
+    @property
+    def is_new(self) -> bool:
+        """Whether nothing is buffered, and nothing remembered that what is fed is matched by."""
+        return False
+
     def for_required(self, required: Sequence[bool], quorum: int) -> tuple["Policy", OptionalStage]:
         """Return a new policy of the same options for a group in which only some inputs are required.
 
@@ -106,6 +119,10 @@ class Queued(Policy, Protocol):
     def flush(self, reason: DropReason) -> list[Drop]:
         self._losses.forget()
         return [drop for queue in self._queues for drop in queue.drop(len(queue.stamps), reason)]
+
+    @property
+    def is_new(self) -> bool:
+        return not any(queue.stamps for queue in self._queues)
 
     def buffered(self, place: int) -> int:
         return self._queues[place].unmatched
