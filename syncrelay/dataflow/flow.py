@@ -3,7 +3,7 @@
 import logging
 from collections import deque
 from collections.abc import Callable, Hashable, Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple, Self, TypeAlias
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol, Self, TypeAlias
 
 from syncrelay.cdr import read_stamp
 from syncrelay.config import GroupConfig
@@ -84,6 +84,17 @@ class Refusals:
             )
 
 
+class Manifests(Protocol):
+    """What hears of each set that left, and of its latency in nanoseconds."""
+
+    is_heard: bool
+    """Whether anyone is told of it."""
+
+    def tell(self, flow: "Flow", match: Match, latency: int) -> None:
+        """Tell of a set that a flow just sent."""
+        ...
+
+
 class Flow:
     """Feeds an engine on the receive thread and publishes the sets that it gives. What it raises stops its group.
 
@@ -115,8 +126,7 @@ class Flow:
         """The inputs of which the last message could not be published."""
         self.bundle: BundleOutlet | None = None
         """What publishes the sets as one message each."""
-        self.tell: Callable[[Flow, Match, int], None] | None = None
-        """Hears of each set that left, and of its latency in nanoseconds."""
+        self.manifests: Manifests | None = None
         self._config = config
         self._now = now
         self._time_ns = runtime.time_ns
@@ -166,8 +176,8 @@ class Flow:
                 self._watched.sets.append((stamps, latency))
                 self.last.append(stamps)
                 self.n_sets += 1
-                if self.tell is not None:
-                    self.tell(self, outcome, latency)
+                if self.manifests is not None:
+                    self.manifests.tell(self, outcome, latency)
                 if is_tapped:
                     self._tape.note(self._config, stamps, left, newest)
             else:

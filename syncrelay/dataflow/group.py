@@ -178,7 +178,7 @@ class GroupRelay:
 
     def tell_sets(self, manifests: GroupManifests) -> None:
         """Have a manifest published of each set from now on, while anyone subscribes to it."""
-        self._manifests, self.flow.tell = manifests, manifests.tell
+        self._manifests = self.flow.manifests = manifests
 
     def suspend(self) -> None:
         """Hold new messages and let no set leave until `resume`; the outlets are forgotten, so they may end now."""

@@ -11,6 +11,7 @@ from syncrelay.dataflow.backend import ALL
 from syncrelay.dataflow.deliveries import Deliveries
 from syncrelay.dataflow.flow import Flow
 from syncrelay.dataflow.group import GroupRelay
+from syncrelay.explain import Tape
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 
@@ -87,12 +88,17 @@ class Outlet:
 
 
 def group_of(
-    *, topics: Iterable[Any] = PAIR, now: Callable[[], int] = lambda: 0, flow: type[Flow] = Flow, **keys: Any
+    *,
+    topics: Iterable[Any] = PAIR,
+    now: Callable[[], int] = lambda: 0,
+    flow: type[Flow] = Flow,
+    tape: Tape | None = None,
+    **keys: Any,
 ) -> GroupRelay:
     """A group, `front` if it has no name, of vectors."""
     listed = [each for topic in topics for each in ([topic] if isinstance(topic, dict) else inputs({topic: VECTOR}))]
     text = config({keys.pop("name", "front"): {"policy": "exact_time", "topics": listed, **keys}})
-    return GroupRelay(load_text(text).groups[0], now=now, flow=flow)
+    return GroupRelay(load_text(text).groups[0], now=now, flow=flow, tape=tape)
 
 
 def connect(group: GroupRelay, outlets: Sequence[Outlet]) -> None:

@@ -4,14 +4,20 @@ from importlib import import_module
 from importlib.util import find_spec
 
 import pytest
-from hypothesis import example, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from syncrelay.cdr import read_stamp
 from syncrelay.dataflow.backend import PublishError
+from syncrelay.dataflow.flow import RECENT
+from syncrelay.explain import Tape
+from syncrelay.sync import DropReason, Message, SyncGroup
 from tests.dataflow.payloads import FLOWS, Named, Outlet, group_of
 from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.streams import BEGIN, MS
+from tests.sync.support.rigs import POLICIES, Step, make_group, options, steps
+from tests.sync.test_vectors import CASES, SHIFT_NS
+from tests.sync.test_vectors import make_policy as policy_of
 
 pytestmark = pytest.mark.skipif(
     find_spec("syncrelay.ros.compiled.path") is None, reason="the compiled path was not built"
@@ -19,44 +25,166 @@ pytestmark = pytest.mark.skipif(
 
 _TOPICS = ("/camera", "/lidar", "/imu")
 _KEYED = [{"topic": topic, "type": VECTOR, "key": "vector.x"} for topic in _TOPICS]
-_KINDS = [
+_AT_ONCE = [
     {"policy": "exact_time", "queue_size": 3},
+    {"policy": "approximate_time", "slop": "20ms", "queue_size": 3},
+    {"policy": "approximate_time_eager", "slop": "20ms"},
+]
+_KINDS = [
+    *_AT_ONCE,
     {"policy": "approximate_time", "slop": "20ms", "queue_size": 3, "restamp": "latest"},
     {"policy": "approximate_time_eager", "slop": "20ms", "max_wait": "5ms", "every": 2},
     {"policy": "latest_time", "trigger": "/camera", "max_age": "1s", "restamp": "/lidar"},
     {"policy": "equal_key", "queue_size": 3, "topics": _KEYED},
 ]
+_MESSAGE = st.tuples(st.integers(0, 2), st.one_of(st.none(), st.integers(-30, 30)), st.booleans())
+# As most come: one of each input, of one stamp or nearly.
+_SET = st.tuples(st.permutations(range(3)), st.sampled_from(((0, 0, 0),) * 3 + ((0, 9, 3), (0, 30, 0))))
 _STREAMS = st.lists(
-    st.tuples(st.integers(0, 2), st.one_of(st.none(), st.integers(-30, 30)), st.booleans()), max_size=60
+    st.one_of(
+        st.lists(_SET, min_size=1, max_size=9).map(
+            lambda sets: [(index, ahead[index], False) for inputs, ahead in sets for index in inputs]
+        ),
+        st.lists(_MESSAGE, max_size=6),
+        st.sampled_from(("tap", "listen", "pause", "count", "watch", "flush", "exchange")),
+    ),
+    max_size=20,
 )
 
 
-def _played(flow, keys, stream, connected) -> list:
-    """All that can be seen of a group of this flow."""
-    seen = [0]
-    group = group_of(**{"topics": _TOPICS, **keys}, now=lambda: seen[0], flow=flow)
-    noted: list[object] = []
-    outlets = [Outlet(log=noted, place=index) for index in range(3)]
-    for index in connected:
-        group.connect(index, outlets[index], restamped=index != 1)
-    group.flow.tell = lambda flow, match, _: noted.append(("told", flow.n_sets, match.stamps, match.stamp))
-    for count, (index, ahead, refuses) in enumerate(stream):
-        seen[0], outlets[index].refusal = count * MS, PublishError("no room") if refuses else None
-        stamp = None if ahead is None else BEGIN + (10 * count + ahead) * MS
-        group.flow.receive(
-            index, Named(count, BEGIN + count), stamp, count // 4 if keys["policy"] == "equal_key" else None
-        )
-        noted.append((group.flow.n_sets, dict(group.unpublished), list(group.flow.keys)))
-        if count % 20 == 19:
+class _Listener:
+    """Notes what it is told of sets, while it listens."""
+
+    def __init__(self, noted) -> None:
+        self.is_heard = False
+        self._noted = noted
+
+    def tell(self, flow, match, _latency) -> None:
+        if self.is_heard:
+            self._noted.append(("told", flow.n_sets, match.stamps, match.stamp))
+
+
+class _Played:
+    """A group of a flow, and all that can be seen of it."""
+
+    def __init__(self, flow, keys, connected) -> None:
+        self.noted: list[object] = []
+        self._has_keys = keys["policy"] == "equal_key"
+        self._now = 0
+        self._tape = Tape()
+        self._group = group_of(**{"topics": _TOPICS, **keys}, now=lambda: self._now, flow=flow, tape=self._tape)
+        self._outlets = [Outlet(log=self.noted, place=index) for index in range(3)]
+        self._connected = connected
+        self._connect()
+        self._listener = self._group.flow.manifests = _Listener(self.noted)
+
+    @property
+    def n_sets(self) -> int:
+        return self._group.flow.n_sets
+
+    def _connect(self) -> None:
+        for index in self._connected:
+            self._group.connect(index, self._outlets[index], restamped=index != 1)
+
+    def play(self, stream):
+        for each in stream:
+            if isinstance(each, str):
+                self._step_aside(each)
+            else:
+                begin = self._now // MS
+                for index, ahead, refuses in each:
+                    self._outlets[index].refusal = PublishError("no room") if refuses else None
+                    # Messages of a set share a stamp.
+                    came = begin + (self._now // MS - begin) // 3 * 3
+                    self._receive(index, None if ahead is None else BEGIN + (10 * came + ahead) * MS)
+        return self.seen()
+
+    def _receive(self, index, stamp) -> None:
+        count = self._now // MS
+        key = count // 4 if self._has_keys and stamp is not None else None
+        self._group.flow.receive(index, Named(count, BEGIN + count), stamp, key)
+        self.noted.append((self._group.flow.n_sets, dict(self._group.unpublished), list(self._group.flow.keys)))
+        self._now += MS
+
+    def _step_aside(self, what) -> None:
+        group = self._group
+        if what == "tap":
+            self._tape.is_on = not self._tape.is_on
+        elif what == "listen":
+            self._listener.is_heard = not self._listener.is_heard
+        elif what == "pause":
+            (group.pause if group.paused_since is None else group.unpause)()
+        elif what == "count":
+            self.noted.append((group.counts(), group.engine.sets))
+        elif what == "watch":
             watched = group.flow.watched()
-            noted.append((*map(list, watched.arrivals), [stamps for stamps, _ in watched.sets]))
-    return [noted, list(group.flow.last), group.counts(), group.failure]
+            self.noted.append((*map(list, watched.arrivals), [stamps for stamps, _ in watched.sets]))
+        elif what == "flush":
+            group.flush(DropReason.TIME_JUMP)
+        else:
+            group.suspend()
+            self._receive(0, BEGIN + 10 * self._now)
+            self._connect()
+            group.resume()
+
+    def seen(self):
+        for last in ("watch", "count"):
+            self._step_aside(last)
+        group = self._group
+        left = [(each.outcome, each.received) for each in self._tape.after(0, most=10_000)[0]]
+        return [self.noted, list(group.flow.last), left, group.failure]
 
 
 @given(keys=st.sampled_from(_KINDS), stream=_STREAMS, connected=st.sets(st.integers(0, 2)))
 def test_the_same_leaves_and_the_same_is_noted(keys, stream, connected):
-    first, second = (_played(flow, keys, stream, connected) for flow in FLOWS)
+    first, second = (_Played(flow, keys, connected).play(stream) for flow in FLOWS)
     assert first == second
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+@given(data=st.data())
+def test_the_same_leaves_of_any_engine(policy, data):
+    chosen = data.draw(options(thinned=data.draw(st.booleans()), limited=data.draw(st.booleans())))
+    assume(chosen.n_inputs > 1)
+    taken = data.draw(steps(chosen.n_inputs))
+    first, second = (_left(flow, make_group(policy, chosen), taken, n_inputs=chosen.n_inputs) for flow in FLOWS)
+    assert first == second
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case["name"])
+def test_the_same_leaves_in_the_peers_own_cases(case):
+    taken = [
+        Step(now=0, message=Message(index, stamp + SHIFT_NS, number))
+        for number, (index, stamp, *_) in enumerate(case["events"])
+    ]
+    first, second = (_left(flow, SyncGroup(policy_of(case)), taken, n_inputs=case["n_inputs"]) for flow in FLOWS)
+    assert first == second
+
+
+def _left(flow, engine, taken, *, n_inputs):
+    """What leaves of an engine, and where its messages went after each step."""
+    now = [0]
+    group = group_of(topics=[f"/input{index}" for index in range(n_inputs)], now=lambda: now[0], flow=flow)
+    group.engine = engine
+    seen = []
+    for number, step in enumerate(taken):
+        now[0] = step.now
+        if step.message is None:
+            group.expire(step.now)
+        else:
+            payload = Named(step.message.payload, number)
+            group.flow.receive(step.message.input, payload, step.message.stamp, step.message.key)
+        seen.append(group.flow.n_sets)
+    return seen, list(group.flow.last), group.counts(), group.failure
+
+
+@pytest.mark.parametrize("keys", _AT_ONCE)
+def test_sets_that_leave_at_once_need_no_engine(keys, monkeypatch):
+    played = _Played(FLOWS[-1], keys, {0, 1, 2})
+    monkeypatch.setattr(SyncGroup, "add", None)
+    _, last, *_ = played.play([[(index, 0, False) for index in range(3)]] * 400)
+    assert len(last) == RECENT
+    assert (last[-1], played.n_sets) == ((BEGIN + 10 * 1197 * MS,) * 3, 400)
 
 
 @given(st.binary(max_size=16))

@@ -16,13 +16,13 @@ from syncrelay.dataflow.backend import PublishError, RclCallError
 from syncrelay.dataflow.deliveries import GID_BYTES, LARGEST_GAP, MOST_PUBLISHERS, Deliveries
 from syncrelay.dataflow.flow import RECENT, Watched
 from syncrelay.explain import RecentDrop
-from syncrelay.sync import DropReason, Match, Message
+from syncrelay.sync import DropReason, Match, Message, SyncGroup
 
 cimport cython
 from cpython.memoryview cimport PyMemoryView_FromMemory
 from libc.stdint cimport INT64_MAX, int32_t, int64_t, uint8_t, uint32_t, uint64_t, uintptr_t
 from libc.stdlib cimport calloc, free
-from libc.string cimport memcmp, memcpy, memset
+from libc.string cimport memcmp, memcpy, memmove, memset
 
 
 cdef extern from *:
@@ -831,7 +831,7 @@ cdef class Deliver:
         cdef int64_t stamp
         try:
             if read_stamp(payload.message.buffer, payload.message.length, &stamp):
-                self.flow.feed(self.index, payload, stamp, None, None)
+                self.flow.take(self.index, payload, stamp, payload.received)
             else:
                 self.flow.reject(self.index, payload)
         except Exception as error:
@@ -839,30 +839,59 @@ cdef class Deliver:
         return 0
 
 
-cdef class Flow:
-    """As dataflow.flow.Flow."""
+include "at_once.pxi"
 
-    cdef public object engine, tell, bundle
+cdef enum:
+    # So many sets leave before an engine is asked again that had to match itself.
+    SETS_UNTIL_ASKED = 8
+
+
+cdef class Flow:
+    """As dataflow.flow.Flow, and forms the sets that leave at once itself while nobody wants more of them."""
+
+    cdef public object manifests, bundle
     cdef public list outlets, restamped, keys
-    cdef readonly object last
     cdef readonly int64_t n_sets
     cdef readonly dict unpublished
-    cdef object _config, _now, _refusals, _tape, _watched, _note_left, _note_set
+    cdef object _engine, _config, _now, _refusals, _tape, _last, _watched, _note_left, _note_set
     cdef list _note_arrival
+    cdef Lent _lent
+    cdef bint _may_lend
+    cdef int _sets_until_asked
 
     def __init__(self, config, *, now, refusals, tape):
         n_inputs = len(config.topics)
-        self.engine, self.tell, self.bundle, self.n_sets = config.engine(), None, None, 0
+        self._lent = Lent(n_inputs)
+        self.manifests, self.bundle, self.n_sets = None, None, 0
         self._config, self._tape = config, tape
         self._refusals, self.unpublished = refusals, refusals.unpublished
         self.outlets, self.restamped, self.keys = [None] * n_inputs, [False] * n_inputs, [None] * n_inputs
-        self.last = deque(maxlen=RECENT)
-        self._note_left = self.last.append
+        self._last = deque(maxlen=RECENT)
+        self._note_left = self._last.append
         self._now = None if now is time.monotonic_ns else now
         self._watch()
+        self.engine = config.engine()
+
+    @property
+    def engine(self):
+        self._take_back(1 if self._lent.n_held else 0)
+        return self._engine
+
+    @engine.setter
+    def engine(self, engine):
+        if self._engine is not None:
+            self._take_back(0)
+        self._engine, self._sets_until_asked = engine, 0
+        self._may_lend = isinstance(engine, SyncGroup) and engine.at_once is not None
+
+    @property
+    def last(self):
+        self._tell()
+        return self._last
 
     def watched(self):
         """Give what came and left since this was last asked for."""
+        self._tell()
         watched = self._watched
         self._watch()
         return watched
@@ -882,19 +911,96 @@ cdef class Flow:
         """Take in a message of one input, whose stamp, in nanoseconds, is None where it or the key cannot be read."""
         if stamp is None:
             self.reject(index, payload)
+        elif key is None and frame is None and 0 <= stamp <= INT64_MAX:
+            self.take(index, payload, stamp, payload.received)
         else:
             self.feed(index, payload, stamp, key, frame)
+
+    cdef int take(self, Py_ssize_t index, object payload, int64_t stamp, int64_t received) except -1:
+        """Take in a message that has no key and no frame."""
+        cdef Lent lent = self._lent
+        if not lent.is_lent and (not self._may_lend or self._sets_until_asked or not self._borrow()):
+            return self.feed(index, payload, stamp, None, None)
+        if not lent.fits(index, stamp) or (lent.n_held + 1 == lent.n_inputs and self._is_told_of()):
+            return self.feed(index, payload, stamp, None, None)
+        if lent.n_rows >= ROWS:
+            self._tell()
+        if lent.hold(index, payload, stamp, received):
+            self._leave()
+        return 0
+
+    cdef bint _borrow(self) except -1:
+        """Ask the engine to lend; whether it does."""
+        newest = None if self._is_told_of() else self._engine.lend()
+        if newest is None:
+            self._sets_until_asked = SETS_UNTIL_ASKED
+            return False
+        self._lent.begin(self._engine.at_once, newest)
+        return True
+
+    cdef bint _is_told_of(self) except -1:
+        """Whether more is to be done of a set than to publish its messages."""
+        return self._tape.is_on or self.bundle is not None or (self.manifests is not None and self.manifests.is_heard)
+
+    cdef int _leave(self) except -1:
+        """Publish the set that is whole."""
+        cdef Lent lent = self._lent
+        cdef int64_t received = lent.close()
+        cdef Row * last = &lent.rows[lent.n_rows - 1]
+        cdef Py_ssize_t index
+        for index in range(lent.n_inputs):
+            payload = lent.payloads[index]
+            lent.payloads[index] = None
+            self._publish(index, payload, None)
+        last.latency = sr_clock(CLOCK_REALTIME) - received
+        self.n_sets += 1
+        return 0
+
+    cdef int _tell(self) except -1:
+        """Have objects of Python tell of what came and left while the engine lent."""
+        cdef Lent lent = self._lent
+        cdef Py_ssize_t n, first
+        cdef Row * row
+        for n in range(lent.n_told, lent.n_rows):
+            row = &lent.rows[n]
+            self._note_arrival[row.index]((row.stamp, row.received))
+        for first in range(0, lent.n_rows - lent.n_held, lent.n_inputs):
+            row = &lent.rows[first]
+            if row[lent.n_inputs - 1].latency == NOT_LEFT:
+                continue
+            stamps = [None] * lent.n_inputs
+            for n in range(lent.n_inputs):
+                stamps[row[n].index] = row[n].stamp
+            told = tuple(stamps)
+            self._note_set((told, row[lent.n_inputs - 1].latency))
+            self._note_left(told)
+        lent.forget()
+        return 0
+
+    cdef int _take_back(self, int sets_until_asked) except -1:
+        """Have the engine match, and ask it again after so many sets."""
+        cdef Lent lent = self._lent
+        if not lent.is_lent:
+            return 0
+        self._sets_until_asked = sets_until_asked
+        self._tell()
+        held, n_sets = lent.held(), lent.n_sets
+        self._engine.take_back(n_sets, lent.end())
+        for message in held:
+            self._engine.add(message, now=0)
+        return 0
 
     cdef int reject(self, Py_ssize_t index, object payload) except -1:
         self.conclude((self.engine.reject(Message(index, 0, payload), DropReason.MALFORMED),))
         return 0
 
     cdef int feed(self, Py_ssize_t index, object payload, object stamp, object key, object frame) except -1:
+        self._take_back(SETS_UNTIL_ASKED)
         cdef object now = sr_clock(CLOCK_MONOTONIC) if self._now is None else self._now()
         self._note_arrival[index]((stamp, payload.received))
         if key is not None:
             self.keys[index] = key
-        outcomes = self.engine.add(Message(index, stamp, payload, key, frame), now=now)
+        outcomes = self._engine.add(Message(index, stamp, payload, key, frame), now=now)
         if outcomes:
             self.conclude(outcomes)
         return 0
@@ -913,8 +1019,10 @@ cdef class Flow:
                 self._note_set((stamps, latency))
                 self._note_left(stamps)
                 self.n_sets += 1
-                if self.tell is not None:
-                    self.tell(self, outcome, latency)
+                if self._sets_until_asked:
+                    self._sets_until_asked -= 1
+                if self.manifests is not None:
+                    self.manifests.tell(self, outcome, latency)
                 if is_tapped:
                     self._tape.note(self._config, stamps, left, newest)
             else:
@@ -935,19 +1043,23 @@ cdef class Flow:
                 continue
             index, payload = message.input, message.payload
             newest = max(newest, payload.received)
-            outlet = self.outlets[index]
-            if outlet is None:
-                continue
-            try:
-                if common is not None and self.restamped[index]:
-                    outlet.send_stamped(payload, common)
-                elif isinstance(outlet, Outlet):
-                    (<Outlet>outlet)._send(payload)
-                else:
-                    outlet.send(payload)
-            except PublishError as error:
-                self._refusals.refused(index, outlet, str(error))
-            else:
-                if self.unpublished:
-                    self._refusals.accepted(index, outlet)
+            self._publish(index, payload, common)
         return newest
+
+    cdef int _publish(self, Py_ssize_t index, object payload, object common) except -1:
+        outlet = self.outlets[index]
+        if outlet is None:
+            return 0
+        try:
+            if common is not None and self.restamped[index]:
+                outlet.send_stamped(payload, common)
+            elif isinstance(outlet, Outlet):
+                (<Outlet>outlet)._send(payload)
+            else:
+                outlet.send(payload)
+        except PublishError as error:
+            self._refusals.refused(index, outlet, str(error))
+        else:
+            if self.unpublished:
+                self._refusals.accepted(index, outlet)
+        return 0
