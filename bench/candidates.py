@@ -107,7 +107,6 @@ class Workshop:
         if not (checkout / "syncrelay/cli").is_dir():
             raise ValueError(f"{kind}: neither `c` nor `typed` nor a checkout of syncrelay")
         switches = {name for name, value in asked.items() if not value}
-        coalesce = asked.pop("coalesce", None)
         if wrong := switches - SWITCHES:
             raise ValueError(f"{word}: no setting is called {', '.join(sorted(wrong))}")
         environ = {"PYTHONPATH": str(checkout), **{name: value for name, value in asked.items() if value}}
@@ -115,7 +114,7 @@ class Workshop:
         is_bundled = "bundled" in switches
         if is_bundled:
             environ |= self._with_messages(load, environ)
-        command = [python, *self._entry(load, switches, coalesce, port)]
+        command = [python, *self._entry(load, switches, port)]
         # What it prints is read by nobody else.
         follow = f'exec "$0" -m syncrelay tap --url http://127.0.0.1:{port} > /dev/null'
         tap = ["sh", "-c", follow, python] if "tapped" in switches else []
@@ -146,14 +145,12 @@ class Workshop:
             "PYTHONPATH": f"{packages}:{environ['PYTHONPATH']}",
         }
 
-    def _entry(self, load, switches, coalesce, port):
+    def _entry(self, load, switches, port):
         keys: dict[str, Any] = {"metrics": {"listen": f"127.0.0.1:{port}"}}
         if "scalars" in switches:
             keys["diagnostics"] = {"scalars": True}
         if "untold" in switches:
             keys = {"metrics": None, "diagnostics": None}
-        if coalesce:
-            keys["node"] = {"coalesce": coalesce}
         self._files += 1
         path = self._folder / f"relay{self._files}.yaml"
         groups = _groups(load)

@@ -2,7 +2,7 @@
 
 A candidate is a checkout of syncrelay (`.`, `/path/to/another`), `c` (bench/floor.c, bare C on rcl) or `typed`
 (bench/typed_relay.py). Settings follow an @, with commas between: environment variables (`.@SYNCRELAY_RECEIVE=rclpy`)
-and the interpreter (`.@PYTHON=/path/to/python`); for a checkout also `coalesce=300us` (as in the file), `heard` (its
+and the interpreter (`.@PYTHON=/path/to/python`); for a checkout also `heard` (its
 manifest has a subscriber), `scalars` (on /diagnostics), `tapped` (by `syncrelay tap`), `untold` (it neither watches
 itself nor tells of it) and `bundled` (each set leaves as one message). `c@bundled` joins the bytes of the messages.
 

@@ -110,22 +110,21 @@ DurationOrNone = Annotated[
 """A duration of 0 or more, in nanoseconds; None for `none`."""
 
 
-def _no_longer(most_s: float, why: str) -> tuple[BeforeValidator, WithJsonSchema]:
-    """Refuse longer durations, and say why."""
-
-    def check(value: object) -> int:
-        duration = not_negative(value)
-        if duration > most_s * 1_000_000_000:
-            raise ValueError(why)
-        return duration
-
-    return BeforeValidator(check), WithJsonSchema(duration_schema(sign=r"\+?", minimum=0, maximum=most_s))
+_TF2_KEEPS_NS: Final = 10_000_000_000
 
 
-ShortDuration = Annotated[int, *_no_longer(0.1, "at most 100ms: all messages of the relay wait that long")]
-"""A duration of 0 to 0.1 s, in nanoseconds."""
+def _while_tf2_keeps_it(value: object) -> int:
+    duration = not_negative(value)
+    if duration > _TF2_KEEPS_NS:
+        raise ValueError("at most 10s: tf2 keeps transforms no longer")
+    return duration
 
-TransformWait = Annotated[int, *_no_longer(10, "at most 10s: tf2 keeps transforms no longer")]
+
+TransformWait = Annotated[
+    int,
+    BeforeValidator(_while_tf2_keeps_it),
+    WithJsonSchema(duration_schema(sign=r"\+?", minimum=0, maximum=10)),
+]
 """A duration of 0 to 10 s, in nanoseconds."""
 
 SignedDuration = Annotated[int, BeforeValidator(parse_duration), WithJsonSchema(duration_schema(sign="[+-]?"))]

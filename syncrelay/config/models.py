@@ -303,7 +303,10 @@ class Group(Keys):
         default=1,
         ge=1,
         le=MOST,
-        description="Only every n-th set leaves; the others are dropped whole, as `thinned`. Default: 1, every set.",
+        description=(
+            "Only every n-th set leaves; the others are dropped whole, as `thinned`. It keeps a share of the sets at"
+            " any rate, as topic_tools' drop does of messages; for a rate write `max_rate`. Default: 1, every set."
+        ),
         examples=[2],
     )
     restamp: Annotated[str, BeforeValidator(_restamp)] = Field(

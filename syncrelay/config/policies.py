@@ -153,7 +153,10 @@ class ApproximateEpsilonTimeGroup(SlopGroup):
     """Sets of the oldest messages of all inputs, where these are near."""
 
     policy: Literal["approximate_epsilon_time"] = Field(
-        description="Sets of the oldest messages of all inputs, where these lie within slop; no search for better ones."
+        description=(
+            "Sets of the oldest messages of all inputs, where these lie within slop; no search for better ones. For the"
+            " same sets as nodes on ApproximateEpsilonTime, such as stereo_image_proc with a tolerance."
+        )
     )
     topics: tuple[NearTopic, ...] = Topics
 

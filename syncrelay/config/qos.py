@@ -103,9 +103,6 @@ class QosOverrides(Keys):
     liveliness_lease_duration: _QosDuration = Field(
         default=None, description=f"Silence after which a publisher counts as lost. {_DURATION} Default: no limit."
     )
-    avoid_ros_namespace_conventions: Annotated[bool | None, NOT_NULL] = Field(
-        default=None, description="Use the topic's name in DDS without the prefix of ROS. Default: false."
-    )
 
     @field_validator("depth")
     @classmethod

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field
 
-from syncrelay.config.keys import NOT_NULL, Host, Keys, ListenAddress, Namespace, NodeName, ShortDuration
+from syncrelay.config.keys import NOT_NULL, Host, Keys, ListenAddress, Namespace, NodeName
 from syncrelay.config.names import expand
 
 Transport: TypeAlias = Literal["default", "large_messages"]
@@ -47,16 +47,6 @@ class NodeConfig(Keys):
             "Offer the services ~/reload, ~/status, ~/pause and ~/resume, which anyone on the ROS graph can call."
             " Default: true."
         ),
-    )
-
-    coalesce: ShortDuration = Field(
-        default=0,
-        description=(
-            "How long the relay waits for others when a message comes, to take them all in one go. It may save CPU"
-            " where many inputs come shortly after each other, and adds as much latency. At most 100ms. A number is"
-            " seconds, a string has a unit (ns, us, ms, s, min). Default: 0, no wait."
-        ),
-        examples=["300us"],
     )
 
     def absolute(self, name: str) -> str:

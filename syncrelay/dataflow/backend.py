@@ -186,8 +186,8 @@ class RclBackend(Protocol):
         """Publish through an rclpy publisher."""
         ...
 
-    def inbox(self, *, coalesce_ns: int = 0) -> Inbox:
-        """Make an inbox, with no sources yet, that waits so long for more after the first message."""
+    def inbox(self) -> Inbox:
+        """Make an inbox, with no sources yet."""
         ...
 
     def graph_changes(self, node: Any) -> GraphChanges:

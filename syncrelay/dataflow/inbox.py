@@ -15,7 +15,6 @@ from syncrelay.runtime import SYSTEM, Runtime
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-_NS_PER_SECOND: Final = 1_000_000_000
 _Head: TypeAlias = tuple[int, int, Payload, Source]
 
 # At most this many are delivered at a time, so that calls and deadlines do not wait for the end of a flood.
@@ -100,17 +99,12 @@ class Backlog:
 
 
 class PolledInbox:
-    """An Inbox that drains the sources which a watch names.
+    """An Inbox that drains the sources which a watch names."""
 
-    When a message comes, it waits `coalesce_ns` for others before it takes them all.
-    """
-
-    def __init__(self, watch: Watch, *, coalesce_ns: int = 0, runtime: Runtime = SYSTEM) -> None:
+    def __init__(self, watch: Watch, *, runtime: Runtime = SYSTEM) -> None:
         self._watch = watch
-        self._coalesce_s = coalesce_ns / _NS_PER_SECOND
         self._monotonic_ns = runtime.monotonic_ns
         self._time_ns = runtime.time_ns
-        self._sleep = runtime.sleep
         # In the order in which they were added.
         self._sources: dict[Source, None] = {}
         self._backlog = Backlog()
@@ -142,10 +136,6 @@ class PolledInbox:
         """Receive once; whether there was a wake."""
         backlog = self._backlog
         sources, until, woken = self._watch.wait(0 if backlog.held else longest_ns)
-        if sources and self._coalesce_s and not backlog.held:
-            self._sleep(self._coalesce_s)
-            more, until, woken_since = self._watch.wait(0)
-            sources, woken = [*sources, *(each for each in more if each not in sources)], woken or woken_since
         backlog.deliver(sources, until)
         return woken
 

@@ -100,7 +100,7 @@ class Relay:
         self.backend = backend.name
         self._bugs = Bugs()
         self._loop = ReceiveLoop(
-            backend.inbox(coalesce_ns=config.node.coalesce),
+            backend.inbox(),
             now=self._clock.now,
             expire=lambda now: self._groups.expire(now),  # noqa: PLW0108  the groups come after the loop
             on_turn=on_turn,

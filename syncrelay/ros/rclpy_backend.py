@@ -152,9 +152,9 @@ class RclpyBackend:
         """Publish through an rclpy publisher."""
         return RclpyOutlet(publisher)
 
-    def inbox(self, *, coalesce_ns: int = 0) -> Inbox:
+    def inbox(self) -> Inbox:
         """Make an inbox, with no sources yet."""
-        return PolledInbox(WaitSetWatch(self._context), coalesce_ns=coalesce_ns)
+        return PolledInbox(WaitSetWatch(self._context))
 
     def graph_changes(self, node: Any) -> NoGraphEvents:  # noqa: ARG002  the protocol's signature
         """Follow the graph as a node sees it."""

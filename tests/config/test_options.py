@@ -223,7 +223,6 @@ OPTIONS: dict[str, Row] = {
     "namespace": of_node("namespace", "/z"),
     "transport": of_node("transport", "large_messages"),
     "services": of_node("services", value=False),
-    "coalesce": of_node("coalesce", "1ms"),
     "lifecycle": of_node("lifecycle", value=True),
     "use_sim_time": of_node("use_sim_time", value=True),
     "node": of_section(lambda config: config.node, node={"name": "z"}),
@@ -275,7 +274,6 @@ QOS_POLICIES = {
     "lifespan": 1,
     "liveliness": "automatic",
     "liveliness_lease_duration": {"sec": 1, "nsec": 0},
-    "avoid_ros_namespace_conventions": True,
 }
 OPTIONS |= {key: of_topic(of_first_topic("qos"), qos={key: value}) for key, value in QOS_POLICIES.items()}
 

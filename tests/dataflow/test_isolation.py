@@ -218,23 +218,3 @@ def test_without_somebody_to_tell_the_loop_raises_what_failed():
     loop = ReceiveLoop(PolledInbox(_Watch(chance)), now=lambda: 0, expire=lambda _: None)
     with pytest.raises((ZeroDivisionError, OSError, MemoryError, RecursionError)):
         loop.run()
-
-
-class _Trickle(_Watch):
-    """Names one source at each wait, and wakes nobody."""
-
-    def wait(self, timeout_ns: int):
-        self.timeouts.append(timeout_ns)
-        return ([self.sources.pop(0)] if self.sources else []), time.time_ns(), False
-
-
-@pytest.mark.parametrize(("coalesce_ns", "delivered"), [(0, [b"a"]), (1, [b"a", b"b"])])
-def test_what_comes_with_the_first_message_is_taken_with_it_where_the_file_says_so(coalesce_ns: int, delivered):
-    watch, came = _Trickle(random.Random(0)), []
-    inbox = PolledInbox(watch, coalesce_ns=coalesce_ns)
-    for source in (Source(Named(b"a")), Source(Named(b"b"))):
-        source.deliver = lambda payload: came.append(payload.name)
-        inbox.add(source)
-    inbox.receive_once(7)
-    assert came == delivered
-    assert watch.timeouts == [7, 0][: len(delivered)]

@@ -33,20 +33,24 @@ class _Clock:
 
 
 class _Watch:
-    def __init__(self, source: Source) -> None:
+    """Names a source after 30 ns, once."""
+
+    def __init__(self, source: Source, clock: _Clock) -> None:
         self._ready, self.add, self.wake = [source], lambda _: None, lambda: None
+        self._clock = clock
 
     def wait(self, _: int):
+        self._clock.sleep(30e-9)
         return [self._ready.pop()] if self._ready else [], 2**62, False
 
 
 def test_messages_wait_and_sets_are_timed_by_the_runtime():
-    runtime, source = _Clock().runtime, Source(Named("x", 1))
-    watch: Any = _Watch(source)
+    clock, source = _Clock(), Source(Named("x", 1))
+    runtime, watch = clock.runtime, cast("Any", _Watch(source, clock))
     group = GroupRelay(load_text(TEXT).groups[0], now=lambda: 0, flow=partial(Flow, runtime=runtime), runtime=runtime)
     group.flow.receive(1, Named("y", 2), 5)
     source.deliver = lambda payload: group.flow.receive(0, payload, 5)
-    inbox, standstills = PolledInbox(watch, coalesce_ns=30, runtime=runtime), Standstills(runtime=runtime)
+    inbox, standstills = PolledInbox(watch, runtime=runtime), Standstills(runtime=runtime)
     inbox.add(source)
     inbox.receive_once(1)
     assert list(group.watched().sets) == [((5, 5), 28)]

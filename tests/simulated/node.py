@@ -476,8 +476,8 @@ class SimulatedBackend:
     def outlet(self, publisher: SimulatedPublisher) -> SimulatedOutlet:
         return SimulatedOutlet(publisher)
 
-    def inbox(self, *, coalesce_ns: int = 0) -> PolledInbox:
-        return PolledInbox(SimulatedWatch(self._runtime), coalesce_ns=coalesce_ns, runtime=self._runtime)
+    def inbox(self) -> PolledInbox:
+        return PolledInbox(SimulatedWatch(self._runtime), runtime=self._runtime)
 
     def graph_changes(self, node: SimulatedNode) -> SimulatedChanges:
         return SimulatedChanges(node.participant)

@@ -194,8 +194,6 @@ def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
         node["use_sim_time"] = True
     if chance.random() < 0.15:
         node["lifecycle"] = True
-    if chance.random() < 0.2:
-        node["coalesce"] = chance.choice(["5ms", "100ms"])
     chaotic = chance.random() < 0.35
     plan = Plan(
         seed,

@@ -104,9 +104,9 @@ class CompiledBackend:
         """Publish through an rclpy publisher."""
         return CompiledOutlet(self._librcl, publisher)
 
-    def inbox(self, *, coalesce_ns: int = 0) -> Inbox:
+    def inbox(self) -> Inbox:
         """Make an inbox, with no sources yet."""
-        inbox: Inbox = path.Inbox(coalesce_ns=coalesce_ns)
+        inbox: Inbox = path.Inbox()
         return inbox
 
     def graph_changes(self, node: Any) -> GraphChanges:

@@ -94,12 +94,6 @@ cdef extern from *:
       clock_gettime(clock, &now);
       return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
     }
-
-    static void sr_rest(int64_t ns)
-    {
-      struct timespec rest = { ns / 1000000000, ns % 1000000000 };
-      nanosleep(&rest, NULL);
-    }
     """
     ctypedef struct sr_bell:
         pass
@@ -112,7 +106,6 @@ cdef extern from *:
     bint sr_was_woken(sr_bell *) noexcept nogil
     uint64_t sr_reported(sr_signal *) noexcept nogil
     int64_t sr_clock(int) noexcept nogil
-    void sr_rest(int64_t) noexcept nogil
     int CLOCK_REALTIME
     int CLOCK_MONOTONIC
 
@@ -524,15 +517,15 @@ cdef class Inbox:
     cdef Py_ssize_t n_held
     cdef sr_bell * bell
     cdef Py_ssize_t n_ringers
-    cdef int64_t coalesce, force_every, forced_at
+    cdef int64_t force_every, forced_at
 
     def __cinit__(self):
         self.bell = <sr_bell *>calloc(1, sizeof(sr_bell))
         if self.bell == NULL:
             raise MemoryError
 
-    def __init__(self, *, coalesce_ns=0, force_ns=SECOND):
-        self.failed, self.sources, self.coalesce, self.force_every = {}, [], coalesce_ns, force_ns
+    def __init__(self, *, force_ns=SECOND):
+        self.failed, self.sources, self.force_every = {}, [], force_ns
         self.forced_at = sr_clock(CLOCK_REALTIME)
 
     def __dealloc__(self):
@@ -579,17 +572,10 @@ cdef class Inbox:
         cdef Source source, only = None
         cdef Py_ssize_t n_ready = 0
         cdef int64_t now, due
-        if not self.n_held:
-            if not sr_heard(self.bell):
-                with nogil:
-                    sr_sleep(self.bell, longest_ns)
-                    if sr_heard(self.bell) and self.coalesce:
-                        self._rest()
-            elif self.coalesce:
-                with nogil:
-                    self._rest()
-        else:
-            sr_heard(self.bell)
+        if not sr_heard(self.bell) and not self.n_held:
+            with nogil:
+                sr_sleep(self.bell, longest_ns)
+                sr_heard(self.bell)
         cdef int woken = sr_was_woken(self.bell)
         now = sr_clock(CLOCK_REALTIME)
         # Now and then all are polled: a report that was never made must not silence a topic.
@@ -608,11 +594,6 @@ cdef class Inbox:
             self._fill()
             self._deliver(due, now, BATCH)
         return woken
-
-    cdef void _rest(self) noexcept nogil:
-        sr_rest(self.coalesce)
-        # What rang meanwhile is looked at now, and not after a rest of its own.
-        sr_heard(self.bell)
 
     def deliver_all(self):
         """Deliver what was received until now, however much it is."""

@@ -79,7 +79,7 @@ OF_RELAYS: Final[tuple[dict[str, Any], ...]] = (
     {"metrics": {"listen": "127.0.0.1:9470"}},
     {"diagnostics": {"scalars": True}},
     {"node": {"name": "relay", "transport": "large_messages"}},
-    {"node": {"name": "relay", "use_sim_time": True, "services": False, "coalesce": "1ms", "lifecycle": True}},
+    {"node": {"name": "relay", "use_sim_time": True, "services": False, "lifecycle": True}},
     {"x-notes": "of the drive"},
 )
 
