@@ -1,17 +1,12 @@
 """The metrics as their page shows them: those of a relay that ran for a while, on simulated sensors."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from prometheus_client.metrics_core import Metric
-
 from syncrelay.config.names_in_graph import SCALARS
-from syncrelay.status.metrics import registry
+from syncrelay.status.metrics import families
 from tests.top.states import healthy
-
-# Of a histogram, the bound of a bucket.
-_BOUND = "le"
-_ENDINGS = {"counter": "_total", "info": "_info"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,13 +19,11 @@ class _Metric:
 
 def metrics() -> Iterator[_Metric]:
     """Yield every metric, in the order of /metrics."""
-    for family in registry(healthy).collect():
-        yield _metric(family)
-
-
-def _metric(family: Metric) -> _Metric:
-    labels = tuple(label for label in family.samples[0].labels if label != _BOUND)
-    return _Metric(family.name + _ENDINGS.get(family.type, ""), family.type, labels, family.documentation)
+    for family in families(healthy()):
+        (_, written, _), *_ = family.samples
+        # Of a histogram, the bound of a bucket is none of its own.
+        labels = tuple(name for name in re.findall(r'(\w+)="', written) if name != "le")
+        yield _Metric(family.full_name, family.kind, labels, family.about)
 
 
 def scalars() -> Sequence[str]:

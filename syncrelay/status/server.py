@@ -8,10 +8,9 @@ import logging
 import socket
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from functools import cache
 from threading import Event, Thread
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import Any, Final, Self
 
 from waitress.server import create_server
 from waitress.wasyncore import close_all
@@ -22,12 +21,10 @@ from syncrelay.errors import ListenError
 from syncrelay.explain import GroupReport
 from syncrelay.status.announcement import Place, announce
 from syncrelay.status.hosts import Hosts
+from syncrelay.status.metrics import exposition
 from syncrelay.status.page import HEADERS, PATHS, page_file
 from syncrelay.status.state import RelayState, is_ready, status_of
 from syncrelay.status.taps import TapRefusedError, Taps
-
-if TYPE_CHECKING:
-    from prometheus_client import CollectorRegistry
 
 # An idle receive loop turns once a second, so one that has not for this long hangs.
 _STALLED_S: Final = 5.0
@@ -153,22 +150,11 @@ def _bound(listen: Listen) -> socket.socket:
 
 
 def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _Answer:
-    @cache
-    def metrics() -> "CollectorRegistry":
-        from syncrelay.status.metrics import registry  # noqa: PLC0415  as below
-
-        return registry(state)
-
-    def answer_metrics(environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
-        # Its import takes as long as that of everything else here, and most relays are never scraped.
-        from prometheus_client.exposition import choose_encoder  # noqa: PLC0415
-
-        encode, content_type = choose_encoder(environ.get("HTTP_ACCEPT", ""))
-        return _answer(start, "200 OK", encode(metrics()), content_type)
-
     answers: dict[str, _Answer] = {
         **{path: _of_page(path) for path in PATHS},
-        "/metrics": answer_metrics,
+        "/metrics": lambda environ, start: _answer(
+            start, "200 OK", *exposition(state(), environ.get("HTTP_ACCEPT", ""))
+        ),
         "/status": lambda _, start: _answer(start, "200 OK", status_of(state()).as_json(), _JSON),
         "/tap": lambda environ, start: _tapped(start, taps, environ["QUERY_STRING"], state),
         "/livez": lambda _, start: _liveness(start, state()),

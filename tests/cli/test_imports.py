@@ -9,7 +9,7 @@ from tests.cli.command import GOOD, run_python
 
 # What only other commands need: packages, and the parts of ours that they are for.
 _OF_OTHERS = {
-    *("argcomplete", "jinja2", "lz4", "mcap", "prometheus_client", "rich", "rosbags", "ruamel"),
+    *("argcomplete", "jinja2", "lz4", "mcap", "rich", "rosbags", "ruamel"),
     *("textual", "zstandard", "syncrelay.recordings", "syncrelay.doctor", "syncrelay.rig", "syncrelay.top"),
 }
 _OF_THE_RELAY = {

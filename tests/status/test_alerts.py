@@ -8,10 +8,9 @@ from pathlib import Path
 
 import pytest
 import yaml
-from prometheus_client import generate_latest
 
 from syncrelay.status import RelayState, status_of
-from syncrelay.status.metrics import registry
+from syncrelay.status.metrics import exposition
 from tests.top import states
 
 _RULES = Path(__file__).parents[2] / "configs" / "prometheus" / "alerts.yaml"
@@ -30,7 +29,7 @@ def promtool(*words: str | Path, given: str | None = None) -> str:
 
 def metrics(state: RelayState) -> str:
     """What a relay in this state answers at /metrics."""
-    return generate_latest(registry(lambda: state)).decode()
+    return exposition(state)[0].decode()
 
 
 def series(state: RelayState, growing: Sequence[str] = ()) -> list[dict[str, str]]:

@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any, Final
 
 import pytest
-from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
 from syncrelay.explain import Sender
-from syncrelay.status.metrics import registry
+from syncrelay.status.metrics import exposition
 from tests.status.support.states import relay, working
 
 _DASHBOARD: Final[dict[str, Any]] = json.loads((Path(__file__).parents[2] / "configs" / "grafana.json").read_text())
@@ -48,7 +47,7 @@ def _exported():
     report = working()
     inputs = tuple(replace(each, graph=replace(each.graph, senders=_SENDERS)) for each in report.facts.inputs)
     with_senders = replace(report, facts=replace(report.facts, inputs=inputs))
-    text = generate_latest(registry(lambda: relay(with_senders))).decode()
+    text = exposition(relay(with_senders))[0].decode()
     samples = [sample for family in text_string_to_metric_families(text) for sample in family.samples]
     return {each.name: set(each.labels) | _OF_A_SCRAPE for each in samples}
 

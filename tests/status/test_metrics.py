@@ -5,12 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from prometheus_client import generate_latest
+from prometheus_client.openmetrics import parser as open_metrics
 from prometheus_client.parser import text_string_to_metric_families
 
 from syncrelay.explain import Code, Finding, Sender, Severity
 from syncrelay.status import Phase
-from syncrelay.status.metrics import registry
+from syncrelay.status.metrics import exposition
 from tests.status.support.states import BEGAN, S, relay, started, working
 
 _SILENT = Finding(Code.SILENT, Severity.WARN, "/camera has been silent for 7 s", None, 0)
@@ -18,8 +18,10 @@ _SILENT = Finding(Code.SILENT, Severity.WARN, "/camera has been silent for 7 s",
 
 def samples(state):
     """The values of a scrape by name and labels."""
-    text = generate_latest(registry(lambda: state)).decode()
-    families = text_string_to_metric_families(text)
+    return _values(text_string_to_metric_families(exposition(state)[0].decode()))
+
+
+def _values(families):
     return {(each.name, frozenset(each.labels.items())): each.value for family in families for each in family.samples}
 
 
@@ -30,6 +32,12 @@ def value(found, name, **labels):
 @pytest.mark.parametrize("state", [relay(), relay(started()), relay(working(), started())])
 def test_every_state_can_be_parsed(state):
     assert samples(state)
+
+
+def test_both_formats_give_the_same_series():
+    text, _ = exposition(relay(working()), "application/openmetrics-text; version=1.0.0,text/plain;q=0.5")
+    families = open_metrics.text_string_to_metric_families(text.decode())
+    assert _values(families) == samples(relay(working()))
 
 
 def test_received_is_matched_and_dropped_and_waiting():
@@ -98,7 +106,7 @@ def test_severities_are_named_in_the_reference_as_the_metrics_name_them():
 
 def test_metrics_are_named_as_prometheus_has_it():
     """What `promtool check metrics` asks for."""
-    text = generate_latest(registry(lambda: relay(working()))).decode()
+    text = exposition(relay(working()))[0].decode()
     told = {kind: dict(re.findall(rf"^# {kind} (\S+) (.+)$", text, re.MULTILINE)) for kind in ("HELP", "TYPE")}
     assert told["HELP"].keys() == told["TYPE"].keys()
     for name, kind in told["TYPE"].items():
@@ -117,19 +125,13 @@ def test_metrics_are_named_as_prometheus_has_it():
 def test_a_finding_that_is_made_twice_is_one_series():
     twice = working()
     twice = replace(twice, problems=(_SILENT, _SILENT))
-    text = generate_latest(registry(lambda: relay(twice))).decode()
+    text = exposition(relay(twice))[0].decode()
     assert len(re.findall(r'^syncrelay_finding\{.*code="silent"', text, re.MULTILINE)) == 1
 
 
-def test_the_state_is_asked_for_at_each_scrape_and_not_before():
-    asked: list[None] = []
-
-    def state():
-        asked.append(None)
-        return relay()
-
-    metrics = registry(state)
-    assert not asked
-    generate_latest(metrics)
-    generate_latest(metrics)
-    assert len(asked) == 2
+def test_names_come_as_they_are_whatever_they_hold():
+    camera, lidar = working().facts.inputs
+    odd = 'a"b\\n\\\n{},='
+    camera = replace(camera, graph=replace(camera.graph, senders=(Sender(odd, 1, 1, sent_in_all=1),)))
+    found = samples(relay(replace(working(), facts=replace(working().facts, inputs=(camera, lidar)))))
+    assert value(found, "syncrelay_messages_sent_total", group="front", topic="/camera", publisher=odd) == 1
