@@ -193,7 +193,9 @@ class Senders:
         came = {alone if each.gid is None else each.gid: each for each in deliveries}
         came.pop(b"", None)
         for gid in [*came, *(each for each in self._publishers if each not in came)]:
-            self._publishers.setdefault(gid, _Publisher()).observe(came.get(gid))
+            if gid not in self._publishers:
+                self._publishers[gid] = _Publisher()
+            self._publishers[gid].observe(came.get(gid))
         for each in publishers:
             if each.gid in self._publishers:
                 self._publishers[each.gid].node = each.node
