@@ -1,7 +1,7 @@
 """Which messages are nearest to which, on arrays: the sets that there could be, whatever the slop and the queues."""
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Final, NamedTuple, TypeAlias
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from syncrelay.clock import UNREADABLE
 from syncrelay.config import Distance, GroupConfig
-from syncrelay.explain.rows import blocks
+from syncrelay.explain.rows import BLOCK, Column, Rows, blocks, median, quantiles, steps
 from syncrelay.sync import Message
 from syncrelay.sync.latest_at_ticks import REST_NS
 from syncrelay.sync.ticks import Ticks
@@ -37,23 +37,33 @@ _NOT_NEAREST: Final = 0.6
 class Received(NamedTuple):
     """One input's messages as they arrived: stamps, times of receipt, and their places among those of all inputs."""
 
-    stamps: Nanoseconds
-    received: Nanoseconds
-    places: Nanoseconds
+    stamps: Column
+    received: Column
+    places: Column
 
     @property
     def are_stamped(self) -> npt.NDArray[np.bool_]:
         """Which messages have a stamp."""
-        stamped: npt.NDArray[np.bool_] = (self.stamps != 0) & (self.stamps != UNREADABLE)
-        return stamped
+        return _are_stamped(self.stamps[:])
+
+    def stamped(self) -> Iterator[tuple[Nanoseconds, Nanoseconds, Nanoseconds]]:
+        """Yield stamps, times of receipt and places of those that have a stamp, many at a time."""
+        for stamps, received, places in zip(*map(blocks, self), strict=True):
+            is_set = _are_stamped(stamps)
+            yield (stamps, received, places) if is_set.all() else (stamps[is_set], received[is_set], places[is_set])
+
+
+def _are_stamped(stamps: Nanoseconds) -> npt.NDArray[np.bool_]:
+    stamped: npt.NDArray[np.bool_] = (stamps != 0) & (stamps != UNREADABLE)
+    return stamped
 
 
 class InOrder(NamedTuple):
     """An input's distinct stamps in order, offset added, the place of each message, and all places in order."""
 
-    stamps: Nanoseconds
-    places: Nanoseconds
-    arrivals: Nanoseconds
+    stamps: Column
+    places: Column
+    arrivals: Column
 
 
 class Sides(NamedTuple):
@@ -101,11 +111,20 @@ def as_arrays(messages: Sequence[Message], n_inputs: int) -> tuple[Received, ...
 
 def in_order(messages: Received, offset: int) -> InOrder:
     """Sort an input's messages by stamp. Of messages with one stamp the last counts, as it does in the engine."""
-    is_set = messages.are_stamped
-    stamps, places = messages.stamps[is_set], messages.places[is_set]
-    _, last = np.unique(stamps[::-1], return_index=True)
-    at = len(stamps) - 1 - last
-    return InOrder(shifted(stamps[at], offset), places[at], np.sort(messages.places))
+    least = [int(stamps.min(initial=_LATEST)) for stamps, _, _ in messages.stamped()]
+    # Stamps below the least that is still to come are in order once they are sorted.
+    to_come = np.minimum.accumulate([2**63 - 1, *reversed(least)])[-2::-1].tolist()
+    ordered, held = Rows(2), np.zeros((0, 2), dtype=np.int64)
+    for (stamps, _, places), bound in zip(messages.stamped(), to_come, strict=True):
+        held = np.concatenate([held, np.stack([stamps, places], axis=1)])
+        if not len(held) or held[:, 0].min() >= bound:
+            continue
+        held = held[np.argsort(held[:, 0], kind="stable")]
+        some = held[: np.searchsorted(held[:, 0], bound)]
+        held = held[len(some) :]
+        some = some[np.append(some[1:, 0] != some[:-1, 0], [True])]
+        ordered.append(np.stack([shifted(some[:, 0], offset), some[:, 1]], axis=1))
+    return InOrder(ordered.column(0), ordered.column(1), messages.places)
 
 
 def shifted(stamps: Nanoseconds, offset: int) -> Nanoseconds:
@@ -141,15 +160,30 @@ def sides(stamps: Nanoseconds, others: Nanoseconds) -> Sides:
     return Sides(np.where(after == 0, 0, before), after, at)
 
 
-def signed_distances(stamps: Nanoseconds, others: Nanoseconds) -> Nanoseconds:
+def _around(stamps: Column, others: Column) -> Iterator[tuple[Nanoseconds, slice]]:
+    """Yield stamps, many at a time, and those of the others around them: one on either side, and one more behind."""
+    for some in blocks(stamps):
+        begin, end = bisect_left(others, some[0]), bisect_right(others, some[-1])
+        yield some, slice(max(0, begin - 1), min(len(others), end + 2))
+
+
+def all_sides(stamps: Column, others: Column) -> Iterator[Sides]:
+    """Yield the sides of stamps of any number, many at a time; both in order."""
+    for some, around in _around(stamps, others):
+        found = sides(some, others[around])
+        yield found._replace(at=found.at + around.start)
+
+
+def signed_distances(stamps: Column, others: Column) -> Nanoseconds:
     """Return how far after each stamp the nearest of the others is, less than 0 where it is before; both in order.
 
     Only stamps with one of the others on either side count.
     """
-    found = sides(stamps, others)
-    signed = np.where(found.after < found.before, found.after, -found.before)
-    between: Nanoseconds = signed[(found.at > 0) & (found.at < len(others))]
-    return between
+    between = [np.zeros(0, dtype=np.int64)]
+    for found in all_sides(stamps, others):
+        signed = np.where(found.after < found.before, found.after, -found.before)
+        between.append(signed[(found.at > 0) & (found.at < len(others))])
+    return np.concatenate(between)
 
 
 def quantile(values: Nanoseconds, share: float) -> int:
@@ -173,36 +207,66 @@ def possible_sets(
     if config.trigger is not None:
         pivot = list(among).index(config.trigger)
     pivots, others = ordered[pivot], [each for at, each in enumerate(ordered) if at != pivot]
-    found = [sides(pivots.stamps, each.stamps) for each in others]
     is_age = config.options.distance is Distance.AGE
-    spans, left = _ages(len(pivots.stamps), found) if is_age else tightest_spans(len(pivots.stamps), found)
-    partners = [
-        np.clip(np.where((each.before <= left) & (each.after != 0), each.at - 1, each.at), 0, len(other.stamps) - 1)
-        for each, other in zip(found, others, strict=True)
-    ]
-    waits = config.options.waits_for_next and config.options.max_wait is None
-    chosen = [(pivots, np.arange(len(spans))), *zip(others, partners, strict=True)]
-    queues = _queues(chosen, successors=int(waits))
+    successors = int(config.options.waits_for_next and config.options.max_wait is None)
+    spans, queues, are_lost, partners = _sets_around(pivots, others, successors=successors, is_age=is_age)
     belong = spans < _FAR
     if is_window:
-        begin, end = max(each.stamps[0] for each in ordered), min(each.stamps[-1] for each in ordered)
-        belong &= (pivots.stamps >= begin) & (pivots.stamps <= end)
+        first, last = max(each.stamps[0] for each in ordered), min(each.stamps[-1] for each in ordered)
+        belong &= (pivots.stamps[:] >= first) & (pivots.stamps[:] <= last)
     is_alone = len(among) == 1
     is_exact = not is_alone and not is_age and float(np.mean(spans == 0)) >= _EQUAL
     if is_exact:
         belong &= spans == 0
     elif not is_alone and not is_age:
-        for side, other in zip(found, others, strict=True):
-            belong &= ~_is_lost(side, other.stamps)
+        belong &= ~are_lost
         periods = [period_of(each.stamps) for each in others]
         usual = quantile(spans[belong], 0.75) if belong.any() else 0
         belong &= spans <= min(_PERIODS * max(periods), _FAR_OFF * usual)
         if not config.options.repeats:
             belong &= _disjoint(spans, partners)
-    unshifted = shifted(pivots.stamps, -config.topics[among[pivot]].offset_ns)
+    unshifted = shifted(pivots.stamps[:], -config.topics[among[pivot]].offset_ns)
     return PossibleSets(
         tuple(among), among[pivot], unshifted[belong], spans[belong], queues[belong], is_exact, is_alone
     )
+
+
+def _sets_around(
+    pivots: InOrder, others: Sequence[InOrder], *, successors: int, is_age: bool
+) -> tuple[Nanoseconds, Nanoseconds, npt.NDArray[np.bool_], list[Nanoseconds]]:
+    """Return of the tightest set of each pivot its span, the fullest queue, if a partner was lost, and the partners."""
+    spans, queues = np.zeros((2, len(pivots.stamps)), dtype=np.int64)
+    partners = [np.zeros(len(spans), dtype=np.int64) for _ in others]
+    are_lost = np.zeros(len(spans), dtype=np.bool_)
+    steady = [_steady_period(each.stamps) for each in others]
+    for begin in range(0, len(spans), BLOCK):
+        some = slice(begin, begin + BLOCK)
+        stamps = pivots.stamps[some]
+        near = [_near(each, stamps) for each in others]
+        found = [sides(stamps, each.stamps[:]) for each, _ in near]
+        spans[some], left = _ages(len(stamps), found) if is_age else tightest_spans(len(stamps), found)
+        chosen = [
+            np.clip(np.where((each.before <= left) & (each.after != 0), each.at - 1, each.at), 0, len(other.stamps) - 1)
+            for each, (other, _) in zip(found, near, strict=True)
+        ]
+        own = _near(pivots, stamps)
+        at_own = np.arange(len(stamps)) + begin - own[1]
+        queues[some] = _queues(
+            [(own[0], at_own), *((each, at) for (each, _), at in zip(near, chosen, strict=True))],
+            successors=successors,
+        )
+        for row, at, (_, first) in zip(partners, chosen, near, strict=True):
+            row[some] = at + first
+        for each, period in zip(found, steady, strict=True):
+            are_lost[some] |= _is_lost(each, period)
+    return spans, queues, are_lost, partners
+
+
+def _near(messages: InOrder, stamps: Nanoseconds) -> tuple[InOrder, int]:
+    """Return an input's messages around some stamps in order, in arrays, and the number of the first of them."""
+    begin = max(0, bisect_left(messages.stamps, stamps[0]) - 1)
+    some = slice(begin, bisect_right(messages.stamps, stamps[-1]) + 2)
+    return InOrder(messages.stamps[some], messages.places[some], messages.arrivals), begin
 
 
 def _sets_at_ticks(
@@ -211,11 +275,11 @@ def _sets_at_ticks(
     """Return the sets of the ticks while messages came: each leaves `max_wait` later with what came by then."""
     if not all(inputs[index].are_stamped.any() for index in among):
         return None
-    received = np.sort(shifted(np.concatenate([each.received for each in inputs]), 0))
+    received = np.sort(shifted(np.concatenate([each.received[:] for each in inputs]), 0))
     # A clock may have been set far off: ticks that rest are not counted.
     breaks = np.nonzero(np.diff(received) > REST_NS)[0]
     begins, ends = received[np.append(0, breaks + 1)].tolist(), received[np.append(breaks, -1)].tolist()
-    first = max(int(inputs[index].received.min()) for index in among)
+    first = max(int(inputs[index].received[:].min()) for index in among)
     numbers = chain.from_iterable(
         range(ticks.first_from(max(first, begin)), ticks.last_until(end) + 1)
         for begin, end in zip(begins, ends, strict=True)
@@ -232,9 +296,9 @@ def _sets_at_ticks(
 def _ages_at(ticks: Nanoseconds, messages: Received, offset: int, max_wait: int) -> Nanoseconds:
     """Return how old an input's latest message is at each tick, of those that came in time for it; _FAR without one."""
     is_set = messages.are_stamped
-    stamps = shifted(messages.stamps[is_set], offset)
+    stamps = shifted(messages.stamps[:][is_set], offset)
     # From the first tick after this on, a message is there.
-    usable = np.maximum(stamps, shifted(messages.received[is_set], -max_wait))
+    usable = np.maximum(stamps, shifted(messages.received[:][is_set], -max_wait))
     order = np.argsort(usable, kind="stable")
     latest, at = np.maximum.accumulate(stamps[order]), np.searchsorted(usable[order], ticks, side="right")
     ages: Nanoseconds = np.where(at > 0, np.minimum(ticks - latest[np.maximum(at - 1, 0)], _FAR), _FAR)
@@ -266,26 +330,34 @@ def _queues(chosen: Sequence[tuple[InOrder, Nanoseconds]], *, successors: int) -
     """Return how long the fullest queue is when each set is complete, or so many messages of each input later."""
     complete = np.zeros(len(chosen[0][1]), dtype=np.int64)
     for each, at in chosen:
-        complete = np.maximum(complete, each.places[np.minimum(at + successors, len(each.places) - 1)])
-    longest = np.ones(len(complete), dtype=np.int64)
+        complete = np.maximum(complete, each.places[:][np.minimum(at + successors, len(each.places) - 1)])
+    longest, latest = np.ones(len(complete), dtype=np.int64), int(complete.max())
     for each, at in chosen:
-        since = np.searchsorted(each.arrivals, each.places[at])
-        longest = np.maximum(longest, np.searchsorted(each.arrivals, complete, side="right") - since)
+        began = each.places[:][at]
+        begin, end = bisect_left(each.arrivals, int(began.min())), bisect_right(each.arrivals, latest)
+        arrivals = each.arrivals[begin:end]
+        since = np.searchsorted(arrivals, began)
+        longest = np.maximum(longest, np.searchsorted(arrivals, complete, side="right") - since)
     return longest
 
 
-def _is_lost(found: Sides, stamps: Nanoseconds) -> npt.NDArray[np.bool_]:
-    """Tell around which messages the partner of a steady input is missing: they are amid a gap, far from its ends."""
+def _steady_period(stamps: Column) -> float:
+    """Return the usual time between the stamps of a steady input, 0 of another."""
     period = period_of(stamps)
-    if not period or quantile(np.diff(stamps), 0.75) > _PERIODS * period:
+    return period if period and quantiles(lambda: steps(stamps), [0.75])[0] <= _PERIODS * period else 0.0
+
+
+def _is_lost(found: Sides, period: float) -> npt.NDArray[np.bool_]:
+    """Tell around which messages the partner of a steady input is missing: they are amid a gap, far from its ends."""
+    if not period:
         return np.zeros(len(found.at), dtype=np.bool_)
     gap = found.before + found.after
     return (gap > _PERIODS * period) & (np.minimum(found.before, found.after) > _NOT_NEAREST * period)
 
 
-def period_of(stamps: Nanoseconds) -> float:
+def period_of(stamps: Column) -> float:
     """Return the usual time between stamps in order, 0 where most are equal or there is only one."""
-    return float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+    return median(lambda: steps(stamps)) if len(stamps) > 1 else 0.0
 
 
 def _disjoint(spans: Nanoseconds, partners: Sequence[Nanoseconds]) -> npt.NDArray[np.bool_]:

@@ -123,9 +123,9 @@ def wandering(trials: Trials, index: int) -> int:
     if tolerance is None or mapped is None or not messages.are_stamped.any():
         return 0
     is_set = messages.are_stamped
-    wandered = _spread(mapped[is_set] - messages.stamps[is_set])
+    wandered = _spread(mapped[is_set] - messages.stamps[:][is_set])
     # What wanders by less than messages are late by may have come of that.
-    jitter = _spread(messages.received[is_set] - mapped[is_set])
+    jitter = _spread(messages.received[:][is_set] - mapped[is_set])
     return wandered if wandered >= max(_LEAST_DISTANCE, _MATTERS * tolerance.ns, jitter) else 0
 
 
@@ -183,7 +183,7 @@ def _attempts(
     """Yield trials with other stamps of an input's messages, what to write for them, and if the delay is known."""
     if "clock" in keys and (at_once := _mapping(trials, index)) is not None:
         device: Changes = (Change("clock", "device", index),)
-        mapped = at_once.inputs[index].stamps
+        mapped = at_once.inputs[index].stamps[:]
         known = [] if delay is None or not 0 <= delay < _LONGEST_DELAY else [_in_tenths(delay)]
         late = [(each, True) for each in known] or [
             (0, False),
@@ -198,7 +198,7 @@ def _attempts(
             )
     if "stamp" in keys:
         by_receipt: Changes = (Change("stamp", "receive", index),)
-        yield _with_stamps(trials, index, trials.inputs[index].received, by_receipt), by_receipt, False
+        yield _with_stamps(trials, index, trials.inputs[index].received[:], by_receipt), by_receipt, False
 
 
 def _in_tenths(delay: int) -> int:
@@ -211,7 +211,7 @@ def _is_rough(mapped: Trials, index: int) -> bool:
     is_set = messages.are_stamped
     if tolerance is None or not is_set.any():
         return False
-    delays = messages.received[is_set] - messages.stamps[is_set]
+    delays = messages.received[:][is_set] - messages.stamps[:][is_set]
     return bool(_ACCURATE * (np.mean(delays) - np.min(delays)) > tolerance.ns)
 
 
@@ -232,8 +232,8 @@ def _mapped_stamps(trials: Trials, index: int) -> Nanoseconds | None:
     """Return an input's stamps as they would be mapped; None of a clock that would be taken as set time and again."""
     steps: list[Step] = []
     clock, messages = DeviceClock(stepped=steps.append), trials.inputs[index]
-    received = messages.received.tolist()
-    mapped = np.fromiter(host_times(clock, messages.stamps.tolist(), received), dtype=np.int64)
+    received = messages.received[:].tolist()
+    mapped = np.fromiter(host_times(clock, messages.stamps[:].tolist(), received), dtype=np.int64)
     if not received or len(steps) > _FEW_STEPS + (received[-1] - received[0]) // _SET_EVERY:
         return None
     return mapped
@@ -270,7 +270,7 @@ def _lateness(moved: Trials, index: int, target: int | None) -> Iterator[int]:
     other = possible.pivot if possible.pivot != index else next(each for each in possible.among if each != index)
     own, others = moved.stamps(index), moved.stamps(other)
     is_pivot = possible.pivot == index
-    late = sides(own, others).before if is_pivot else sides(others, own).after
+    late = sides(own[:], others[:]).before if is_pivot else sides(others[:], own[:]).after
     # What the mapping did at first, before it had settled, tells nothing.
     late = late[len(late) // 2 :]
     if len(late) < _FEWEST:

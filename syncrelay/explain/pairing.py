@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from syncrelay.config import Distance
-from syncrelay.explain.nearest import Nanoseconds, period_of, quantile, shifted, signed_distances
+from syncrelay.explain.nearest import Nanoseconds, period_of, shifted, signed_distances
+from syncrelay.explain.rows import Column, quantiles
 from syncrelay.explain.trials import REQUIRED, Trials
 
 # A message usually takes no longer than this, and leaves before the next is measured.
@@ -29,19 +30,17 @@ def is_certain(moved: Trials, index: int, target: int | None = REQUIRED) -> bool
         return True
     own = moved.stamps(index)
     most = min(_LONGEST_WAY, round(_SHARE_OF_PERIOD * period_of(own)))
-    messages = moved.inputs[index]
-    is_set = messages.are_stamped
-    if not is_set.any():
+    messages, offset = moved.inputs[index], moved.config.topics[index].offset_ns
+    if not messages.are_stamped.any():
         return False
-    delays = messages.received[is_set] - shifted(messages.stamps[is_set], moved.config.topics[index].offset_ns)
     # When it was measured, after its stamp: between these.
-    last = quantile(delays, _LEAST)
+    (last,) = quantiles(lambda: (at - shifted(stamps, offset) for stamps, at, _ in messages.stamped()), [_LEAST])
     first = last - most
     others = [each for each in possible.among if each != index] if index == possible.pivot else [possible.pivot]
     return all(_belong(own, moved.stamps(each), first, last, tolerance.ns) for each in others)
 
 
-def _belong(own: Nanoseconds, theirs: Nanoseconds, first: int, last: int, tolerance: int) -> bool:
+def _belong(own: Column, theirs: Column, first: int, last: int, tolerance: int) -> bool:
     """Whether the nearest are within the tolerance whenever its own were measured, between the first and the last.
 
     Or they are within it at some time, and no others are at any.
@@ -52,7 +51,7 @@ def _belong(own: Nanoseconds, theirs: Nanoseconds, first: int, last: int, tolera
     if _nearly_all(np.maximum(np.abs(after - first), np.abs(after - last)) <= tolerance):
         return True
     least, most = first - tolerance, last + tolerance
-    partners = _counts(theirs, own + least, own + most), _counts(own, theirs - most, theirs - least)
+    partners = _counts(theirs[:], own[:] + least, own[:] + most), _counts(own[:], theirs[:] - most, theirs[:] - least)
     return _nearly_all((least <= after) & (after <= most)) and all(_nearly_all(each <= 1) for each in partners)
 
 

@@ -2,8 +2,9 @@
 
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
+from math import ceil
 from typing import IO, Final, Protocol, TypeAlias, overload
 
 import numpy as np
@@ -12,6 +13,8 @@ import numpy.typing as npt
 from syncrelay.errors import OutputError
 
 Numbers: TypeAlias = npt.NDArray[np.int64]
+Stretches: TypeAlias = Callable[[], Iterable[Numbers]]
+"""Gives numbers some at a time, each time that it is called."""
 
 BLOCK: Final = 1 << 14
 """So many rows are kept, and worked on, at a time."""
@@ -19,6 +22,9 @@ BLOCK: Final = 1 << 14
 # So many bytes stay in memory: most recordings need no file.
 _IN_MEMORY: Final = 4_000_000
 _BYTES: Final = 8
+# So many numbers are sorted at once; of more, those are counted that lie in each of so many parts of their range.
+_AT_ONCE: Final = 1 << 17
+_PARTS: Final = 1 << 14
 
 
 class Column(Protocol):
@@ -36,6 +42,62 @@ def blocks(column: Column, size: int = BLOCK) -> Iterator[Numbers]:
     """Yield the numbers of a column in order, in arrays of up to `size`."""
     for begin in range(0, len(column), size):
         yield column[begin : begin + size]
+
+
+def steps(column: Column) -> Iterator[Numbers]:
+    """Yield how far it is from each number of a column to the next."""
+    for begin in range(0, len(column) - 1, BLOCK):
+        yield np.diff(column[begin : begin + BLOCK + 1])
+
+
+def extent(stretches: Stretches) -> tuple[int, int, int]:
+    """Return how many numbers there are, the least and the greatest; the least is above the greatest of none."""
+    count, least, greatest = 0, 2**63 - 1, -(2**63)
+    for some in stretches():
+        if len(some):
+            count, least, greatest = count + len(some), min(least, int(some.min())), max(greatest, int(some.max()))
+    return count, least, greatest
+
+
+def quantiles(stretches: Stretches, shares: Sequence[float]) -> list[int]:
+    """Return the numbers that these shares of all do not exceed; they occurred. There must be one or more."""
+    count, least, greatest = extent(stretches)
+    # As np.quantile's inverted_cdf has it, to the last bit.
+    ranks = [max(0, ceil(count * share - 1)) for share in shares]
+    return _ranked(stretches, ranks, count, least, greatest)
+
+
+def median(stretches: Stretches) -> float:
+    """Return the number in the middle, or the mean of the two there. There must be one or more."""
+    count, least, greatest = extent(stretches)
+    low, high = _ranked(stretches, [(count - 1) // 2, count // 2], count, least, greatest)
+    return (float(low) + float(high)) / 2
+
+
+def _ranked(stretches: Stretches, ranks: Sequence[int], count: int, least: int, greatest: int) -> list[int]:
+    """Return numbers by their ranks, from 0, among those from the least to the greatest, of which there are so many."""
+
+    def within() -> Iterator[Numbers]:
+        return (some[(some >= least) & (some <= greatest)] for some in stretches())
+
+    if least == greatest:
+        return [least] * len(ranks)
+    if count <= _AT_ONCE:
+        ordered = np.sort(np.concatenate([*within()]))
+        return [int(ordered[rank]) for rank in ranks]
+    width = (greatest - least) // _PARTS + 1
+    counts = sum((np.bincount((some - least) // width, minlength=_PARTS) for some in within()), np.zeros(_PARTS, int))
+    ends = np.cumsum(counts)
+    parts = np.searchsorted(ends, ranks, side="right").tolist()
+    found: dict[int, int] = {}
+    for part in set(parts):
+        begin, before = least + part * width, int(ends[part] - counts[part])
+        of_part = [rank for rank, its in zip(ranks, parts, strict=True) if its == part]
+        numbers = _ranked(
+            stretches, [rank - before for rank in of_part], int(counts[part]), begin, min(greatest, begin + width - 1)
+        )
+        found.update(zip(of_part, numbers, strict=True))
+    return [found[rank] for rank in ranks]
 
 
 def no_numbers() -> Column:

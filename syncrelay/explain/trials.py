@@ -21,6 +21,7 @@ from syncrelay.explain.changes import Change, Changes, changed, offset_change
 from syncrelay.explain.epochs import time_scale
 from syncrelay.explain.nearest import (
     LONGEST,
+    InOrder,
     Nanoseconds,
     PossibleSets,
     Received,
@@ -31,6 +32,7 @@ from syncrelay.explain.nearest import (
     shifted,
     signed_distances,
 )
+from syncrelay.explain.rows import Column, Stretches, extent, median, quantiles
 from syncrelay.explain.set_spans import NOTHING, Run, match, of_one_moment
 from syncrelay.explain.widths import are_amid, tolerances, wander, with_headroom
 from syncrelay.sync import Message
@@ -251,9 +253,12 @@ class Trials:
             return (with_headroom(possible.spans), words.at_least(possible.widest))
         return tolerances(possible, [self.stamps(each) for each in possible.among], self.config.options.distance)
 
-    def stamps(self, index: int) -> Nanoseconds:
+    def stamps(self, index: int) -> Column:
         """Return an input's distinct stamps in order, offset added."""
-        return in_order(self.inputs[index], self.config.topics[index].offset_ns).stamps
+        return self._in_order(index, self.config.topics[index].offset_ns).stamps
+
+    def _in_order(self, index: int, offset: int) -> InOrder:
+        return in_order(self.inputs[index], offset)
 
     def _exact(self) -> Iterator[Changes]:
         is_by_stamp = all(topic.stamp != "receive" for topic in self.config.topics)
@@ -301,14 +306,18 @@ class Trials:
     def _lateness(self, index: int) -> int:
         """Return how much later than the required inputs' an optional input's messages come, with headroom."""
         delays = [self._delays(other) for other in self.required]
-        others, own = [int(np.median(each)) for each in delays if len(each)], self._delays(index)
+        others, own = (
+            [int(median(each)) for each in delays if extent(each)[0]],
+            np.concatenate([*self._delays(index)()]),
+        )
         return parse_duration(with_headroom(shifted(own, -min(others)))) if others and len(own) else 0
 
-    def _delays(self, index: int) -> Nanoseconds:
+    def _delays(self, index: int) -> Stretches:
         """Return how long after its stamp, offset added, each message of an input came."""
         messages, offset = self.inputs[index], self.config.topics[index].offset_ns
-        is_set = messages.are_stamped
-        return shifted(shifted(messages.received[is_set], 0) - shifted(messages.stamps[is_set], offset), 0)
+        return lambda: (
+            shifted(shifted(received, 0) - shifted(stamps, offset), 0) for stamps, received, _ in messages.stamped()
+        )
 
     def verdict(self, target: int | None, keys: Collection[str], *, all_widths: bool = False) -> Verdict:
         """Return the fewest values of the plan, of these keys, that cure a target.
@@ -365,7 +374,7 @@ class Trials:
             scatter = quantile(distances, 0.95) - quantile(distances, 0.05)
             if abs(middle) < _LEAST_DISTANCE or 2 * scatter > abs(middle):
                 continue
-            delays = [float(np.median(self._delays(at))) for at in (index, pivot)]
+            delays = [median(self._delays(at)) for at in (index, pivot)]
             whole = round((delays[0] - delays[1] + middle) / period) * period
             is_whole = bool(whole) and abs(delays[0] - delays[1] + middle - whole) <= _SAME * period
             shift = whole - middle if is_whole else -middle
@@ -373,7 +382,7 @@ class Trials:
                 continue
             # Of two, the one that is farther from this machine's time is odd.
             at, shift = (index, shift) if abs(delays[0]) >= abs(delays[1]) else (pivot, -shift)
-            is_same_rate = abs(float(np.median(np.diff(one))) / period - 1) <= _SAME_RATE
+            is_same_rate = abs(period_of(one) / period - 1) <= _SAME_RATE
             if (change := offset_change(at, round(self.config.topics[at].offset_ns + shift))) is not None:
                 yield change, is_whole and is_same_rate
 
@@ -405,7 +414,7 @@ class Trials:
     def apart(self, index: int) -> int:
         """Return how much later after its stamp an input's message comes than the required ones' do; 0 if unknown."""
         among = {*self._needed, index}
-        delays = {at: int(quantile(each, 0.5)) for at in among if len(each := self._delays(at))}
+        delays = {at: quantiles(each, [0.5])[0] for at in among if extent(each := self._delays(at))[0]}
         if index not in delays or len(delays) < 2:  # noqa: PLR2004  one alone has no other clock
             return 0
         # Of two, the one that is farther from this machine's time is odd.

@@ -9,6 +9,7 @@ import numpy as np
 from syncrelay.config import Distance
 from syncrelay.explain import words
 from syncrelay.explain.nearest import Nanoseconds, PossibleSets, period_of, quantile, signed_distances
+from syncrelay.explain.rows import Column
 
 _SECOND: Final = 1_000_000_000
 # Beyond the usual widest span, this share of what spans scatter by, and more of few: their widest are still to come.
@@ -53,7 +54,7 @@ class Wander(NamedTuple):
         return _HOLDS * min(_USUAL_RATE, self.rate + _MAY * self.error)
 
 
-def wander(stamps: Nanoseconds, others: Nanoseconds) -> Wander:
+def wander(stamps: Column, others: Column) -> Wander:
     """Measure the distances from the stamps of an input to the nearest of another, both in order."""
     distances = signed_distances(stamps, others)
     if len(distances) < _FEWEST:
@@ -76,7 +77,7 @@ def _headroom(spans: Nanoseconds) -> int:
     return round(scatter * (_HEADROOM + _OF_FEW / sqrt(len(spans))))
 
 
-def are_amid(stamps: Nanoseconds, others: Nanoseconds) -> bool:
+def are_amid(stamps: Column, others: Column) -> bool:
     """Whether even those stamps that are nearest to others lie amid two of these."""
     distances = np.abs(signed_distances(stamps, others))
     return len(distances) > 0 and quantile(distances, _TIGHT) > _CLEARLY * period_of(others) > 0
@@ -93,7 +94,7 @@ def _others_as_near(spans: Nanoseconds, periods: Sequence[float]) -> bool:
     return tight > _CLEARLY * quick > 0 and not run_free
 
 
-def tolerances(possible: PossibleSets, stamps: Sequence[Nanoseconds], distance: Distance) -> tuple[str, ...]:
+def tolerances(possible: PossibleSets, stamps: Sequence[Column], distance: Distance) -> tuple[str, ...]:
     """Return durations to try, of sets whose inputs have these stamps in order; none where others are about as near."""
     if distance is not Distance.SPAN or possible.is_alone:
         return tuple(dict.fromkeys((with_headroom(possible.spans), words.at_least(possible.widest))))

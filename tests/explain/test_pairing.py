@@ -37,7 +37,7 @@ def a_rig(period_ms: float, other_ms: float, *, phase_ms: float, late_ms: float,
 
 def farthest_ms(rig: Trials, late_ms: float) -> float:
     """How far from its nearest, by mapped stamps, a message of the slower input was truly measured, of nearly all."""
-    stamps = [rig.stamps(0), rig.stamps(1)]
+    stamps = [rig.stamps(0)[:], rig.stamps(1)[:]]
     slow, quick = sorted((0, 1), key=lambda index: len(stamps[index]))
     true = [stamps[0], stamps[1] - round(late_ms * MS)]
     nearest = np.abs(stamps[slow][:, None] - stamps[quick][None, :]).argmin(axis=1)

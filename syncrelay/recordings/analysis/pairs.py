@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from syncrelay.explain.nearest import Received, in_order, sides
-from syncrelay.explain.rows import Column, Rows
+from syncrelay.explain.nearest import all_sides, in_order
+from syncrelay.explain.rows import Column, Rows, blocks
 from syncrelay.recordings.analysis.streams import Stream
 from syncrelay.recordings.analysis.topics import Spread, spread
 
@@ -33,18 +33,18 @@ class Pair:
 def pair(first: Stream, second: Stream, offsets: tuple[int, int]) -> Pair | None:
     """Return how far the messages of the slower stream are from the other's; None where one has no stamps."""
     one, other = (
-        in_order(Received(*stream.arrays()), offset).stamps
-        for stream, offset in zip((first, second), offsets, strict=True)
+        in_order(stream.as_received(), offset).stamps for stream, offset in zip((first, second), offsets, strict=True)
     )
     if not len(one) or not len(other):
         return None
     if len(one) > len(other):
         first, second, one, other = second, first, other, one
-    before, after, _ = sides(one, other)
-    signed = np.where(after <= before, after, -before)
     kept = Rows(1)
-    kept.append(signed[:, None])
-    return Pair(first.topic, second.topic, spread(signed), spread(np.abs(signed)), kept.column(0))
+    for before, after, _ in all_sides(one, other):
+        kept.append(np.where(after <= before, after, -before)[:, None])
+    signed = kept.column(0)
+    distance = spread(lambda: map(np.abs, blocks(signed)))
+    return Pair(first.topic, second.topic, spread(lambda: blocks(signed)), distance, signed)
 
 
 def worth_seeing(pairs: Sequence[Pair]) -> tuple[int, ...]:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from syncrelay.explain.rows import Column
+from syncrelay.explain.rows import Column, blocks
 from syncrelay.recordings.analysis import Analysis, GroupAnalysis, Topic
 from syncrelay.recordings.analysis.curves import Point
 from syncrelay.recordings.analysis.topics import spread
@@ -80,7 +80,7 @@ def _group(each: GroupAnalysis) -> dict[str, Any]:
 
 def _quantity(values: Column) -> dict[str, Any] | None:
     """Return the spread of a quantity; None if there are no values."""
-    return asdict(spread(values[:])) if len(values) else None
+    return asdict(spread(lambda: blocks(values))) if len(values) else None
 
 
 def _curves(each: GroupAnalysis) -> dict[str, Any]:

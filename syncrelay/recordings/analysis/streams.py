@@ -9,6 +9,7 @@ import numpy as np
 
 from syncrelay.clock import DeviceClock, Step, host_times
 from syncrelay.config import GroupConfig, StampSource
+from syncrelay.explain.nearest import Received
 from syncrelay.explain.rows import Column as Numbers
 from syncrelay.explain.rows import Rows, blocks, no_numbers
 from syncrelay.recordings.bag.bindings import GroupBinding
@@ -111,6 +112,10 @@ class Stream:
     def arrays(self) -> tuple[Nanoseconds, Nanoseconds, Nanoseconds]:
         """Give stamps, times of receipt and places as whole arrays."""
         return self.stamps[:], self.received[:], self.places[:]
+
+    def as_received(self) -> Received:
+        """Give the messages as they arrived."""
+        return Received(self.stamps, self.received, self.places)
 
     def add(self, column: Column, batch: Batch, begin: int) -> None:
         """Take messages of a batch, which begins at a place of the recording."""

@@ -2,9 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, overload
-
-import numpy as np
+from typing import Final
 
 from syncrelay.config import GroupConfig
 from syncrelay.config.units import parse_duration
@@ -13,9 +11,9 @@ from syncrelay.explain import words
 from syncrelay.explain.changes import Change as TriedChange
 from syncrelay.explain.changes import Changes
 from syncrelay.explain.epochs import BOOT_NS
-from syncrelay.explain.nearest import Received, quantile
+from syncrelay.explain.nearest import quantile
 from syncrelay.explain.other_stamps import by_offset_of_clock, by_other_stamps, if_delay_is_known, wandering
-from syncrelay.explain.rows import Column
+from syncrelay.explain.rows import Column, blocks, median
 from syncrelay.explain.rules_transforms import enough_wait
 from syncrelay.explain.trials import Trials
 from syncrelay.recordings.analysis.changes import Change
@@ -52,26 +50,9 @@ def trials_of(group: GroupConfig, streams: Sequence[Stream], evaluation: Evaluat
     options = group.options
     is_alike = options.every == 1 and not options.max_rate and options.transforms is None and group.ticks is None
     sets = evaluation.sets.rows.blocks if evaluation is not None and is_alike else None
-    return Trials(group, lambda: messages(streams), _Inputs(streams), is_window=False, sets=sets)
-
-
-class _Inputs(Sequence[Received]):
-    """The messages of each input as arrays, which are made when they are asked for: those of all inputs are large."""
-
-    def __init__(self, streams: Sequence[Stream]) -> None:
-        self._streams = streams
-
-    def __len__(self) -> int:
-        return len(self._streams)
-
-    @overload
-    def __getitem__(self, at: int) -> Received: ...
-    @overload
-    def __getitem__(self, at: slice) -> Sequence[Received]: ...
-    def __getitem__(self, at: int | slice) -> Received | Sequence[Received]:
-        if isinstance(at, slice):
-            return _Inputs(self._streams[at])
-        return Received(*self._streams[at].arrays())
+    return Trials(
+        group, lambda: messages(streams), [each.as_received() for each in streams], is_window=False, sets=sets
+    )
 
 
 def suggest(
@@ -261,7 +242,7 @@ def _latency(evaluation: Evaluation) -> float:
 
 
 def _median(values: Column) -> float:
-    return float(np.median(values[:]))
+    return median(lambda: blocks(values))
 
 
 def _hint(group: GroupConfig, pivot: int, offset: TriedChange) -> str:

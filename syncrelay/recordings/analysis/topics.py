@@ -1,12 +1,16 @@
 """Figures of one topic: its rhythm, the faults of its stamps, and its stamps against the times of receipt."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from syncrelay.explain import UNREADABLE
 from syncrelay.explain.clocks import drift
+from syncrelay.explain.nearest import in_order
+from syncrelay.explain.rows import Column, Rows, Stretches, blocks, extent, median, quantiles, steps
 from syncrelay.recordings.analysis.streams import Stream
 from syncrelay.recordings.bag.columns import Nanoseconds
 
@@ -57,39 +61,55 @@ class TopicFigures:
 
 def figures_of(stream: Stream) -> TopicFigures:
     """Return the figures of a topic's stream."""
-    stamps, received, _ = stream.arrays()
-    unstamped = int(np.count_nonzero(stamps == 0))
-    is_set = (stamps != 0) & (stamps != UNREADABLE)
-    stamped, at = stamps[is_set], received[is_set]
-    steps = np.diff(stamped)
+    stamps, received = stream.stamps, stream.received
+    unstamped = sum(int(np.count_nonzero(some == 0)) for some in blocks(stamps))
+    unreadable = sum(int(np.count_nonzero(some == UNREADABLE)) for some in blocks(stamps))
+    messages = stream.as_received()
+    if unstamped or unreadable:
+        kept = Rows(2)
+        for some, at, _ in messages.stamped():
+            kept.append(np.stack([some, at], axis=1))
+        stamps, received = kept.column(0), kept.column(1)
     # Of a topic without stamps, the arrivals tell the rhythm.
-    distinct = _distinct(stamped if len(stamped) else received)
-    periods: Nanoseconds = np.diff(distinct)
-    usual = int(np.median(periods)) if len(periods) else None
-    gaps = periods[periods > _GAP * usual] if usual else periods[:0]
+    distinct = in_order(messages, 0).stamps if len(stamps) else _distinct(stream.received[:])
+
+    def delays() -> Iterator[Nanoseconds]:
+        return (at - some for some, at in zip(blocks(stamps), blocks(received), strict=True))
+
+    def periods() -> Iterator[Nanoseconds]:
+        return steps(distinct)
+
+    count, least, most = extent(periods)
+    usual = int(median(periods)) if count else None
+    far = _GAP * usual if usual else most
+    gaps = sum(int(np.count_nonzero(some > far)) for some in periods())
+    is_delayed = len(stamps) and any(some.any() for some in delays())
     return TopicFigures(
         topic=stream.topic,
         type=stream.type,
-        messages=len(stamps),
-        rate_hz=len(periods) * _SECOND / int(distinct[-1] - distinct[0]) if len(periods) else 0.0,
+        messages=len(stream.stamps),
+        rate_hz=count * _SECOND / int(distinct[-1] - distinct[0]) if count else 0.0,
         period=usual,
-        jitter=_quantile(np.abs(periods - usual), 0.95) if usual is not None else None,
-        least_period=int(np.min(periods)) if len(periods) else None,
-        gaps=len(gaps),
-        longest_gap=int(np.max(gaps)) if len(gaps) else None,
-        duplicates=len(stamped) - len(distinct) if len(stamped) else 0,
-        out_of_order=int(np.count_nonzero(steps < 0)),
+        jitter=quantiles(lambda: (np.abs(some - usual) for some in periods()), [0.95])[0]
+        if usual is not None
+        else None,
+        least_period=least if count else None,
+        gaps=gaps,
+        longest_gap=most if gaps else None,
+        duplicates=len(stamps) - len(distinct) if len(stamps) else 0,
+        out_of_order=sum(int(np.count_nonzero(some < 0)) for some in steps(stamps)),
         unstamped=unstamped,
-        unreadable=int(np.count_nonzero(stamps == UNREADABLE)),
-        delay=spread(at - stamped) if len(stamped) and not np.array_equal(at, stamped) else None,
-        drift_ppm=_drift_ppm(stamped, at),
+        unreadable=unreadable,
+        delay=spread(delays) if is_delayed else None,
+        drift_ppm=_drift_ppm(stamps, received),
     )
 
 
-def spread(values: Nanoseconds) -> Spread:
+def spread(values: Stretches) -> Spread:
     """Return the spread of one value or more."""
-    low, median, high = (_quantile(values, share) for share in (0.05, 0.5, 0.95))
-    return Spread(int(np.min(values)), low, median, high, int(np.max(values)))
+    _, least, greatest = extent(values)
+    low, middle, high = quantiles(values, (0.05, 0.5, 0.95))
+    return Spread(least, low, middle, high, greatest)
 
 
 def _distinct(values: Nanoseconds) -> Nanoseconds:
@@ -98,18 +118,17 @@ def _distinct(values: Nanoseconds) -> Nanoseconds:
     return ordered[np.concatenate(([True], ordered[1:] != ordered[:-1]))[: len(ordered)]]
 
 
-def _quantile(values: Nanoseconds, share: float) -> int:
-    """Return a value that occurred: floats would lose the nanoseconds of an epoch."""
-    return int(np.quantile(values, share, method="inverted_cdf"))
-
-
-def _drift_ppm(stamps: Nanoseconds, received: Nanoseconds) -> float | None:
+def _drift_ppm(stamps: Column, received: Column) -> float | None:
     """Return the drift, by the least delay of each of some hundred stretches; None where it is lost in noise."""
     if len(stamps) < _DRIFT_POINTS // 10:
         return None
-    parts = np.array_split(np.arange(len(stamps)), min(_DRIFT_POINTS, len(stamps) // 3))
-    delays = received - stamps
-    points = [(int(received[part[len(part) // 2]]), int(np.min(delays[part] - delays[0]))) for part in parts]
+    count = min(_DRIFT_POINTS, len(stamps) // 3)
+    each, more = divmod(len(stamps), count)
+    ends = [each * number + min(number, more) for number in range(count + 1)]
+    first, points = received[0] - stamps[0], []
+    for begin, end in pairwise(ends):
+        at = received[begin:end]
+        points.append((int(at[len(at) // 2]), int(np.min(at - stamps[begin:end] - first))))
     found = drift(points)
     if found is None or found.watched_ns < _DRIFT_WATCHED or abs(found.drifted_ns) < _DRIFT_BENDS * found.bend_ns:
         return None
