@@ -14,7 +14,7 @@ import numpy as np
 from syncrelay.config import GroupConfig
 from syncrelay.explain import UNREADABLE, EngineDriver
 from syncrelay.explain.nearest import extents
-from syncrelay.explain.rows import BLOCK, Column, Rows
+from syncrelay.explain.rows import BLOCK, Column, Numbers, Rows
 from syncrelay.recordings.analysis.streams import Stream, stretches, transforms_beside
 from syncrelay.sync import DropReason, InputCounts, Lapse, Match, Outcome, SyncGroup
 
@@ -110,6 +110,10 @@ class Drops:
     def __iter__(self) -> Iterator[DropOut]:
         for index, stamp, received, number in self.rows.lists():
             yield DropOut(index, stamp, received, REASONS[number])
+
+    def numbered(self) -> Iterator[tuple[int, Numbers]]:
+        """Yield the number of the first of some thousand drops, and their rows."""
+        return zip(range(0, len(self.rows), BLOCK), self.rows.blocks(), strict=True)
 
 
 class Look(NamedTuple):

@@ -1,5 +1,6 @@
 """Where the messages of each input went, and which dropped ones cost no set: no partner was left for them."""
 
+from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,8 +11,9 @@ import numpy.typing as npt
 
 from syncrelay.config import GroupConfig
 from syncrelay.explain import FOR_WANT_OF_A_PARTNER, UNREADABLE
-from syncrelay.explain.nearest import shifted
-from syncrelay.recordings.analysis.evaluation import REASONS, Evaluation, numbers_of
+from syncrelay.explain.nearest import Received, in_order, shifted
+from syncrelay.explain.rows import Column, Rows
+from syncrelay.recordings.analysis.evaluation import REASONS, Drops, Evaluation, numbers_of
 from syncrelay.recordings.bag.columns import Nanoseconds
 from syncrelay.sync import DropReason
 
@@ -52,10 +54,8 @@ def input_fates(group: GroupConfig, evaluation: Evaluation, unneeded: Unneeded) 
     """Return where the messages of each input went."""
     without_cost: Counter[int] = Counter()
     costly: list[Counter[DropReason]] = [Counter() for _ in group.topics]
-    begin = 0
-    for rows in evaluation.drops.rows.blocks():
+    for begin, rows in evaluation.drops.numbered():
         flags = unneeded.flags[begin : begin + len(rows)]
-        begin += len(rows)
         kinds, first, counts = np.unique(
             2 * (rows[:, 0] * len(REASONS) + rows[:, 3]) + flags, return_index=True, return_counts=True
         )
@@ -89,42 +89,56 @@ def find_unneeded(group: GroupConfig, evaluation: Evaluation, reach: int | None)
     input, or there is none. `reach` is the span of the widest possible set; None where possible sets are not known:
     then no message is called unneeded. But where a clock makes the sets, each message is that gave way to a newer one.
     """
-    of, stamps, _, reasons = evaluation.drops.rows[:].T
-    flags = np.isin(reasons, numbers_of([DropReason.SUPERSEDED] if group.ticks is not None else []))
+    flags = np.zeros(len(evaluation.drops), dtype=np.bool_)
+    superseded = numbers_of([DropReason.SUPERSEDED] if group.ticks is not None else [])
+    for begin, rows in evaluation.drops.numbered():
+        flags[begin : begin + len(rows)] = np.isin(rows[:, 3], superseded)
     lacking: list[tuple[int, ...]] = [() for _ in group.topics]
     if reach is None:
         return Unneeded(flags, tuple(lacking))
     needed = group.enough([counts.fed for counts in evaluation.counts])
     for index in range(len(group.topics)):
-        places = np.flatnonzero((of == index) & np.isin(reasons, numbers_of(FOR_WANT_OF_A_PARTNER)))
-        wanting = shifted(stamps[places], group.topics[index].offset_ns)
-        others = [each for each in needed if each != index]
-        lacks = {each: ~_has_near(wanting, _left_over(group, evaluation, each, index), reach) for each in others}
-        if not lacks:
-            continue
-        is_unneeded = np.any(np.stack(list(lacks.values())), axis=0)
-        flags[places] = is_unneeded
-        lacking[index] = _lacking_inputs(lacks, is_unneeded)
+        others = {each: _left_over(group, evaluation, each, index) for each in needed if each != index}
+        if others:
+            lacking[index] = _flag(
+                flags, evaluation.drops, index, others, offset=group.topics[index].offset_ns, reach=reach
+            )
     return Unneeded(flags, tuple(lacking))
 
 
-def _left_over(group: GroupConfig, evaluation: Evaluation, index: int, wanting: int) -> Nanoseconds:
-    """Return the stamps, sorted, of an input's messages that are in no set with a message of the wanting input."""
-    drops, sets = evaluation.drops.rows[:].T, evaluation.sets.rows[:].T
-    dropped = drops[1, (drops[0] == index) & ~np.isin(drops[3], numbers_of(_NO_PARTNER))]
-    without = sets[index, (sets[wanting] == UNREADABLE) & (sets[index] != UNREADABLE)]
-    return np.sort(shifted(np.concatenate([dropped, without]), group.topics[index].offset_ns))
+def _flag(
+    flags: _Flags, drops: Drops, index: int, others: Mapping[int, Column], *, offset: int, reach: int
+) -> tuple[int, ...]:
+    """Flag the drops of an input that cost no set; return the inputs of which it lacked messages."""
+    wanting = numbers_of(FOR_WANT_OF_A_PARTNER)
+    lacking: set[int] = set()
+    # Those that alone tell why.
+    enough = dict.fromkeys(others)
+    for begin, rows in drops.numbered():
+        places = np.flatnonzero((rows[:, 0] == index) & np.isin(rows[:, 3], wanting))
+        stamps = shifted(rows[places, 1], offset)
+        lacks = {each: ~_has_near(stamps, those, reach) for each, those in others.items()}
+        flags[begin + places] = is_unneeded = np.any(np.stack([*lacks.values()]), axis=0)
+        lacking |= {each for each, its in lacks.items() if its.any()}
+        enough = {each: None for each in enough if np.array_equal(lacks[each], is_unneeded)}
+    return tuple([each for each in enough if each in lacking][:1] or [each for each in others if each in lacking])
 
 
-def _has_near(stamps: Nanoseconds, others: Nanoseconds, reach: int) -> _Flags:
-    if not len(others):
+def _left_over(group: GroupConfig, evaluation: Evaluation, index: int, wanting: int) -> Column:
+    """Return the stamps, in order, of an input's messages that are in no set with a message of the wanting input."""
+    left, no_partner = Rows(1), numbers_of(_NO_PARTNER)
+    for rows in evaluation.drops.rows.blocks():
+        left.append(rows[(rows[:, 0] == index) & ~np.isin(rows[:, 3], no_partner), 1:2])
+    for rows in evaluation.sets.rows.blocks():
+        left.append(rows[rows[:, wanting] == UNREADABLE, index : index + 1])
+    stamps = left.column(0)
+    return in_order(Received(stamps, stamps, stamps), group.topics[index].offset_ns).stamps
+
+
+def _has_near(stamps: Nanoseconds, others: Column, reach: int) -> _Flags:
+    if not len(stamps) or not len(others):
         return np.zeros(len(stamps), dtype=np.bool_)
-    at = np.searchsorted(others, stamps - reach, side="left")
-    near: _Flags = (at < len(others)) & (others[np.minimum(at, len(others) - 1)] <= stamps + reach)
+    first = bisect_left(others, int(stamps.min()) - reach)
+    around = others[first : bisect_right(others, int(stamps.max()) + reach)]
+    near: _Flags = np.searchsorted(around, stamps - reach) < np.searchsorted(around, stamps + reach, side="right")
     return near
-
-
-def _lacking_inputs(lacks: dict[int, _Flags], is_unneeded: _Flags) -> tuple[int, ...]:
-    lacking = [index for index, flags in lacks.items() if flags.any()]
-    enough = [index for index in lacking if np.array_equal(lacks[index], is_unneeded)]
-    return tuple(enough[:1] or lacking)
