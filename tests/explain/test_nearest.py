@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.config import Distance
-from syncrelay.explain.nearest import NearestSpans, as_arrays, possible_sets, signed_distances
+from syncrelay.explain.nearest import NearestSpans, Received, as_arrays, in_order, possible_sets, signed_distances
+from syncrelay.explain.rows import BLOCK
 from syncrelay.sync import Message
 from tests.explain.scenario import BEGAN, MS, Source, group_of
 
@@ -84,6 +85,48 @@ def test_a_message_is_in_one_possible_set_at_most_the_tightest():
     found = possible_sets(group, as_arrays(messages, 2), (0, 1), is_window=False)
     assert found is not None
     assert ((found.stamps - BEGAN) // MS).tolist() == [at for at in sorted(slow) if at != 500]
+
+
+def test_stamps_of_a_long_recording_are_put_in_order_whatever_their_order_was():
+    rng = np.random.default_rng(1)
+    stamps = BEGAN + np.arange(5 * BLOCK) * MS + rng.integers(-3, 4, 5 * BLOCK) * MS
+    # A clock that was set back, and messages without a stamp.
+    stamps[3 * BLOCK :] -= 2 * BLOCK * MS
+    stamps[:: BLOCK // 3] = 0
+    places = np.arange(len(stamps)) * 2
+    found = in_order(Received(stamps, stamps, places), 5)
+    expected, last = np.unique(stamps[stamps != 0][::-1], return_index=True)
+    assert np.array_equal(found.stamps[:], expected + 5)
+    assert np.array_equal(found.places[:], places[stamps != 0][::-1][last])
+
+
+@pytest.mark.parametrize(
+    "policy", [{"policy": "approximate_time", "slop": "9ms"}, {"policy": "latest_time", "max_age": "9ms"}]
+)
+def test_possible_sets_are_the_same_whatever_stretches_they_are_found_in(policy, monkeypatch):
+    rng = np.random.default_rng(1)
+    periods = (30, 20, 7)
+    came = sorted(
+        (at * MS + int(rng.integers(5 * MS)), index, at * MS + int(rng.integers(2 * MS)))
+        for index, period in enumerate(periods)
+        for at in range(0, 6000, period)
+        if rng.random() < 0.95
+    )
+    messages = [Message(index, BEGAN + stamp, BEGAN + at) for at, index, stamp in came]
+    group = group_of(
+        [Source(f"/{name}", 1) for name in "abc"], {**policy, **({"trigger": "/a"} if "max_age" in policy else {})}
+    )
+    whole, by_stretches = (_possible(group, messages, monkeypatch, size) for size in (BLOCK, 7))
+    assert len(whole.stamps) > 50
+    for name in ("stamps", "spans", "queues"):
+        assert np.array_equal(getattr(whole, name), getattr(by_stretches, name)), name
+
+
+def _possible(group, messages, monkeypatch, size):
+    monkeypatch.setattr("syncrelay.explain.nearest.BLOCK", size)
+    found = possible_sets(group, as_arrays(messages, 3), (0, 1, 2), is_window=False)
+    assert found is not None
+    return found
 
 
 def test_after_clearing_nothing_of_before_counts():

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.errors import OutputError
-from syncrelay.explain.rows import BLOCK, Rows, blocks
+from syncrelay.explain.rows import BLOCK, Rows, blocks, median, quantiles, steps
 
 _SIZES = st.integers(0, 3 * BLOCK)
 
@@ -36,3 +36,17 @@ def test_a_full_disk_is_said_with_what_helps(monkeypatch):
     monkeypatch.setattr(tempfile, "TemporaryFile", lambda: Path("/dev/full").open("r+b"))  # noqa: SIM115
     with pytest.raises(OutputError, match="cannot be written: No space left on device; set TMPDIR to another folder"):
         Rows(1, in_memory=0).append(np.zeros((BLOCK, 1), dtype=np.int64))
+
+
+@pytest.mark.parametrize("count", [1, 2, 1000, 300_001])
+@pytest.mark.parametrize("spread", [10, 10**6, 2**60])
+def test_quantiles_and_medians_of_stretches_are_those_of_the_whole(count, spread):
+    rng = np.random.default_rng(count)
+    whole = rng.integers(-spread, spread, count)
+    # One far off all others, as where a clock was set.
+    whole[0] = 2**61
+    shares = (0.0, 0.05, 0.5, 0.75, 0.95, 0.995, 1.0)
+    expected = [int(np.quantile(whole, share, method="inverted_cdf")) for share in shares]
+    assert quantiles(lambda: blocks(whole), shares) == expected
+    assert median(lambda: blocks(whole)) == float(np.median(whole))
+    assert np.array_equal(np.concatenate([*steps(whole), whole[:0]]), np.diff(whole))
