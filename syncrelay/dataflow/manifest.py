@@ -22,6 +22,8 @@ _OK, _WARN, _ERROR, _STALE = range(4)
 _COUNT: Final = Struct("<I").pack
 # The encapsulation header of little-endian CDR, then the stamp.
 _BEGIN: Final = Struct("<4BiI").pack
+# Numbers of the same lengths become the same.
+_ANY_DIGITS: Final = bytes.maketrans(b"0123456789", b"0000000000")
 # Of a group there are some dozens, by the lengths of its numbers.
 _MOST_TEMPLATES: Final = 500
 # Why a message could not be published is told in DDS's words, this far.
@@ -90,9 +92,9 @@ class ManifestWriter:
         values = [value for row in rows if row[1] is not None for value in row]
         kinds = tuple([None if stamp is None else unpublished.get(index, "") for index, stamp in enumerate(stamps)])
         # At once: one by one takes half as long again.
-        digits = (b"%d " * (len(numbers) + len(values)) % (*numbers, *values)).split()
-        unbundled = unpublished.get(len(stamps))
-        key = (common is None, kinds, unbundled, *map(len, digits))
+        written = b"%d " * (len(numbers) + len(values)) % (*numbers, *values)
+        digits, unbundled = written.split(), unpublished.get(len(stamps))
+        key = (common is None, kinds, unbundled, written.translate(_ANY_DIGITS))
         template = self._templates.get(key) or self._template(key, digits, kinds, unbundled)
         return template % (_BEGIN(0, 1, 0, 0, *divmod(header, _NS_PER_SECOND)), *digits)
 
