@@ -100,10 +100,6 @@ class ApproximateTime(Queued):
         # No set is better than one of equal stamps.
         return 0
 
-    @property
-    def is_new(self) -> bool:
-        return not self._overflowed and super().is_new
-
     def for_required(self, required: Sequence[bool], quorum: int) -> tuple["ApproximateTime", OptionalInputs]:
         policy = ApproximateTime(
             n_inputs=sum(required),

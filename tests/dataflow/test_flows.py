@@ -15,7 +15,7 @@ from syncrelay.sync import DropReason, Message, SyncGroup
 from tests.dataflow.payloads import FLOWS, Named, Outlet, group_of
 from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.streams import BEGIN, MS
-from tests.sync.support.rigs import POLICIES, Step, make_group, options, steps
+from tests.sync.support.rigs import POLICIES, Step, make_group, options, plain_options, steps
 from tests.sync.test_vectors import CASES, SHIFT_NS
 from tests.sync.test_vectors import make_policy as policy_of
 
@@ -38,12 +38,17 @@ _KINDS = [
     {"policy": "equal_key", "queue_size": 3, "topics": _KEYED},
 ]
 _MESSAGE = st.tuples(st.integers(0, 2), st.one_of(st.none(), st.integers(-30, 30)), st.booleans())
-# As most come: one of each input, of one stamp or nearly.
-_SET = st.tuples(st.permutations(range(3)), st.sampled_from(((0, 0, 0),) * 3 + ((0, 9, 3), (0, 30, 0))))
+# As most come: one of each input, of one stamp or nearly; the last set may lack some.
+_SPREADS = st.sampled_from(((0, 0, 0),) * 4 + ((0, 9, 3), (0, 21, 0)))
 _STREAMS = st.lists(
     st.one_of(
-        st.lists(_SET, min_size=1, max_size=9).map(
-            lambda sets: [(index, ahead[index], False) for inputs, ahead in sets for index in inputs]
+        st.builds(
+            lambda sets, ahead, lacking: [(index, ahead[index], False) for inputs in sets for index in inputs][
+                :lacking
+            ],
+            st.lists(st.permutations(range(3)), min_size=1, max_size=12),
+            _SPREADS,
+            st.sampled_from((None, None, None, -1, -2)),
         ),
         st.lists(_MESSAGE, max_size=6),
         st.sampled_from(("tap", "listen", "pause", "count", "watch", "flush", "exchange")),
@@ -144,7 +149,7 @@ def test_the_same_leaves_and_the_same_is_noted(keys, stream, connected):
 @pytest.mark.parametrize("policy", POLICIES)
 @given(data=st.data())
 def test_the_same_leaves_of_any_engine(policy, data):
-    chosen = data.draw(options(thinned=data.draw(st.booleans()), limited=data.draw(st.booleans())))
+    chosen = data.draw(plain_options() | options())
     assume(chosen.n_inputs > 1)
     taken = data.draw(steps(chosen.n_inputs))
     first, second = (_left(flow, make_group(policy, chosen), taken, n_inputs=chosen.n_inputs) for flow in FLOWS)
@@ -165,6 +170,8 @@ def _left(flow, engine, taken, *, n_inputs):
     """What leaves of an engine, and where its messages went after each step."""
     now = [0]
     group = group_of(topics=[f"/input{index}" for index in range(n_inputs)], now=lambda: now[0], flow=flow)
+    # What an engine holds goes with it.
+    group.flow.receive(0, Named("before"), SHIFT_NS)
     group.engine = engine
     seen = []
     for number, step in enumerate(taken):

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.sync import DropReason, ExactTime, Match, Message, SyncGroup
-from tests.sync.support.rigs import POLICIES, make_group, options, steps
+from tests.sync.support.rigs import POLICIES, make_group, options, plain_options, steps
 
 
 class Borrower:
@@ -52,8 +52,7 @@ class Borrower:
 
 @st.composite
 def rigs(draw):
-    kinds = draw(st.sampled_from([{}, {"optional": False, "limited": False, "thinned": False}]))
-    chosen = draw(options(**kinds))
+    chosen = draw(plain_options() | options())
     return chosen, draw(steps(chosen.n_inputs))
 
 

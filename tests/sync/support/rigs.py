@@ -156,6 +156,12 @@ def options(draw, *, optional=True, limited=True, thinned=True, offset=False):
     )
 
 
+def plain_options():
+    """Options of a group that asks for nothing but matching."""
+    drawn = options(optional=False, limited=False, thinned=False)
+    return drawn.map(lambda each: replace(each, offsets=(), restamp=None))
+
+
 LAGS = (0, 0, 0, 0, 0, 1, 1, 2, 3, 5, 8, 13, 100, 101, 250)
 """By how much a stamp is behind the newest: jitter between inputs, inversions, jumps of more than a second."""
 
