@@ -140,7 +140,14 @@ class _Played:
         return [self.noted, list(group.flow.last), left, group.failure]
 
 
+_IN_ORDER = [(index, 0, False) for index in range(3)]
+# Who begins to listen, to tap or to watch while an engine lends.
+_LOOKED_AT = [_IN_ORDER, "listen", _IN_ORDER, "listen", *[_IN_ORDER] * 9, "tap", _IN_ORDER, "tap", *[_IN_ORDER] * 9]
+
+
 @given(keys=st.sampled_from(_KINDS), stream=_STREAMS, connected=st.sets(st.integers(0, 2)))
+@example(keys=_AT_ONCE[0], stream=[*_LOOKED_AT, _IN_ORDER[:2], "watch", "count"], connected={0, 1})
+@example(keys=_AT_ONCE[2], stream=[[(0, 0, False), (1, 21, False), (2, 0, False)], _IN_ORDER], connected={0, 1, 2})
 def test_the_same_leaves_and_the_same_is_noted(keys, stream, connected):
     first, second = (_Played(flow, keys, connected).play(stream) for flow in FLOWS)
     assert first == second
