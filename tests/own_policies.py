@@ -1,6 +1,6 @@
-"""Packages that bring policies: the example of docs/howto/own_policy.md, and broken ones."""
+"""Packages that bring policies: examples/led-by, and broken ones."""
 
-import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
@@ -10,18 +10,13 @@ from unittest.mock import patch
 
 from syncrelay.config.installed import installed_policies
 
-_PAGE = Path(__file__).parents[1] / "docs" / "howto" / "own_policy.md"
+_EXAMPLE = Path(__file__).parents[1] / "examples" / "led-by"
 
 
 def installed_example(folder: Path) -> Path:
-    """Build and install the package of the page, and return the folder to put on sys.path."""
+    """Build and install the example, and return the folder to put on sys.path."""
     source, target = folder / "led-by", folder / "target"
-    (source / "led_by").mkdir(parents=True)
-    page = _PAGE.read_text()
-    (toml,) = re.findall(r"^```toml\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
-    (source / "pyproject.toml").write_text(toml)
-    for name, text in re.findall(r"^```python\n# (led_by/\w+\.py)\n(.*?)^```", page, re.DOTALL | re.MULTILINE):
-        (source / name).write_text(text)
+    shutil.copytree(_EXAMPLE, source)
     pip = [sys.executable, "-m", "pip", "install", "--no-index", "--no-deps", "--no-build-isolation"]
     done = subprocess.run([*pip, "--target", target, source], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -37,7 +37,7 @@ _TYPES = dict.fromkeys(_TOPICS, VECTOR)
 
 @pytest.fixture(scope="module")
 def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The package of docs/howto/own_policy.md, installed in a folder."""
+    """The package of examples/led-by, installed in a folder."""
     return installed_example(tmp_path_factory.mktemp("own_policy"))
 
 
@@ -48,6 +48,15 @@ def _keys(**keys: Any) -> dict[str, Any]:
 def _beside(package: Path) -> dict[str, str]:
     """An environment in which syncrelay and the package are installed."""
     return {"PYTHONPATH": f"{Path(__file__).parents[1]}:{package}"}
+
+
+def test_what_the_page_shows_of_it_is_what_it_is():
+    root = Path(__file__).parents[1]
+    page = (root / "docs/howto/own_policy.md").read_text()
+    shown = re.findall(r"^```(?:toml|python)\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    files = [each.read_text() for each in (root / "examples/led-by").rglob("*.[tp][oy]*")]
+    assert [text for text in shown if not any(text in file for file in files)] == []
+    assert len(shown) == 2
 
 
 def test_its_keys_are_validated_with_suggestions(package: Path, tmp_path: Path):

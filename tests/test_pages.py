@@ -95,7 +95,7 @@ def _is_known_install(words):
         "install '.[ros,test,lint]'",
         "install '.[datasets,fleet]'",
         "install '.[datasets]'",
-        "install ./led-by",
+        "install ./examples/led-by",
         "install -e 'src/syncrelay[top,recordings]'",
     }
 
