@@ -2,7 +2,6 @@
 
 import json
 import random
-import re
 from collections import Counter
 from dataclasses import dataclass
 from math import isnan
@@ -32,7 +31,7 @@ _SEED = 29
 _DRAWN = 18
 _LASTS_S = 8
 _DAYS = ("2023-11-14", "2023-11-15", "2023-11-16")
-_QUERIES = re.findall(r"```sql\n(.*?)```", (ROOT / "docs" / "howto" / "fleet_report.md").read_text(), re.DOTALL)
+_QUERIES = [each for each in (ROOT / "configs" / "fleet.sql").read_text().split(";\n") if "SELECT" in each]
 
 
 @dataclass(frozen=True)
