@@ -292,7 +292,7 @@ class Observation:
 
     def _last_drop(self, index: int, reason: DropReason) -> int:
         """Return when an input's last drop for a reason was seen."""
-        count = self._polls[-1].counts[index].dropped.get(reason, 0)
+        count = self._polls[-1].counts[index].dropped[reason]
         return next(each.at for each in self._polls if each.counts[index].dropped.get(reason, 0) == count)
 
 

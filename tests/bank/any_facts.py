@@ -74,7 +74,7 @@ def any_facts(chance: random.Random) -> Iterator[list[GroupFacts]]:
     groups = [replace(_some_changed(base, chance), name=f"g{n}") for n in range(chance.choice([1, 1, 2, 3, _MOST]))]
     for _ in range(_LOOKS):
         yield [replace(each, figures=replace(each.figures, shares=_same_share(each))) for each in groups]
-        by = chance.choice([S, S, 2 * S, 5 * S, 10 * S, 61 * S])
+        by = chance.choice([S, S, 2 * S, 5 * S, 10 * S, 30 * S, 60 * S])
         step: Callable[[GroupFacts, int], Any] = chance.choice([_waits, _goes_on, _goes_on, _goes_on])
         groups = [_some_changed(each, chance) if chance.random() < _CHANGES else each for each in groups]
         groups = [step(each, by) for each in groups]
