@@ -6,7 +6,7 @@ import json
 import random
 from array import array
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -19,13 +19,15 @@ from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.troubles import troubles
 from syncrelay.status.state import group_of
 from tests.bank.any_facts import said_of
+from tests.bank.any_trials import answers
 from tests.bank.kinds import KINDS
 from tests.bank.play import Drawn, drawn, publishers_of
 from tests.bank.rig import S
 from tests.explain.scenario import Source, run
 from tests.explain.scenario import group_of as scenario_group_of
 
-# A block of any facts has so many draws.
+# A block of any facts or trials has so many draws.
+_OF_ANY: Final = {"facts": said_of, "trials": answers}
 _AT_ONCE: Final = 25
 
 KNOWN: Final = Path(__file__).with_name("known.txt")
@@ -116,19 +118,12 @@ def fixed() -> list[Fixed]:
 
 
 def known(fixed: Fixed) -> str:
-    """Write down what is known of a draw: of any facts how often each code is found, and a digest of all that is said.
+    """Write down what is known of a draw: of any facts and trials how often what is told, and a digest of all that is.
 
-    Of others when the code of what explains most changed, with its words, and digests of all shown and all observed.
+    Of a rig when the code of what explains most changed, with its words, and digests of all shown and all observed.
     """
-    if fixed.kinds == "facts":
-        codes, digest = Counter[str](), hashlib.sha256()
-        for number in range(fixed.seed * _AT_ONCE, (fixed.seed + 1) * _AT_ONCE):
-            for code, text in said_of(random.Random(f"facts {number}")):
-                codes[code] += 1
-                digest.update(text.encode())
-        return "\n".join(
-            [fixed.name, ", ".join(f"{code} {codes[code]}" for code in sorted(codes) if code), digest.hexdigest()[:12]]
-        )
+    if (told := _OF_ANY.get(fixed.kinds)) is not None:
+        return "\n".join([fixed.name, *_told(told, fixed)])
     draw, lines, digest, before, log = fixed.drawn(), [fixed.name], hashlib.sha256(), "", CauseLog()
     observed = hashlib.sha256()
     sources, options, beside = draw.sources, draw.rig.options, dict[str, Any](stops=draw.rig.stops)
@@ -153,6 +148,16 @@ def known(fixed: Fixed) -> str:
     seconds = int(draw.seconds) + 1
     run(*sources, seconds=seconds, options=options, publishers=shown, looks=draw.looks, hears=hears, **beside)
     return "\n".join([*lines, f"{digest.hexdigest()[:12]} {observed.hexdigest()[:12]}"])
+
+
+def _told(told: Callable[[random.Random], Iterable[tuple[str, str]]], fixed: Fixed) -> Iterator[str]:
+    counts, digest = Counter[str](), hashlib.sha256()
+    for number in range(fixed.seed * _AT_ONCE, (fixed.seed + 1) * _AT_ONCE):
+        for what, text in told(random.Random(f"{fixed.kinds} {number}")):
+            counts[what] += 1
+            digest.update(text.encode())
+    yield ", ".join(f"{what} {counts[what]}" for what in sorted(counts) if what)
+    yield digest.hexdigest()[:12]
 
 
 def _plain(value: Any) -> Any:

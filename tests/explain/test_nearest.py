@@ -9,7 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.config import Distance
-from syncrelay.explain.nearest import NearestSpans, Received, as_arrays, in_order, possible_sets, signed_distances
+from syncrelay.explain.nearest import (
+    NearestSpans,
+    Received,
+    as_arrays,
+    in_order,
+    possible_sets,
+    shifted,
+    signed_distances,
+)
 from syncrelay.explain.rows import BLOCK
 from syncrelay.sync import Message
 from tests.explain.scenario import BEGAN, MS, Source, group_of
@@ -142,3 +150,8 @@ def test_what_piles_up_while_an_input_is_silent_is_bounded():
         nearest.add([range(begin, begin + 1000), []], pivot=0)
     assert sum(map(len, nearest._stamps)) <= 5000  # noqa: SLF001  memory is the promise
     assert nearest.add([[], [99_998, 99_999]], pivot=1) == [0, 0]
+
+
+def test_an_offset_does_not_turn_the_latest_stamp_into_the_earliest():
+    (stamps, *_) = as_arrays([Message(0, 2**63 - 1, BEGAN)], 1)
+    assert shifted(stamps.stamps, 1)[0] > 0
