@@ -18,6 +18,7 @@ from syncrelay.explain import CauseLog, ClockState, Distribution, Finding, Group
 from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.troubles import troubles
 from syncrelay.status.state import group_of
+from tests.bank.any_arrivals import judged
 from tests.bank.any_facts import said_of
 from tests.bank.any_trials import answers
 from tests.bank.kinds import KINDS
@@ -26,8 +27,7 @@ from tests.bank.rig import S
 from tests.explain.scenario import Source, run
 from tests.explain.scenario import group_of as scenario_group_of
 
-# A block of any facts or trials has so many draws.
-_OF_ANY: Final = {"facts": said_of, "trials": answers}
+# A block of what is drawn without a rig has so many draws.
 _AT_ONCE: Final = 25
 
 KNOWN: Final = Path(__file__).with_name("known.txt")
@@ -118,11 +118,11 @@ def fixed() -> list[Fixed]:
 
 
 def known(fixed: Fixed) -> str:
-    """Write down what is known of a draw: of any facts and trials how often what is told, and a digest of all that is.
+    """Write down what is known of a draw: without a rig how often what is told, and a digest of all that is.
 
     Of a rig when the code of what explains most changed, with its words, and digests of all shown and all observed.
     """
-    if (told := _OF_ANY.get(fixed.kinds)) is not None:
+    if (told := _WITHOUT_A_RIG.get(fixed.kinds)) is not None:
         return "\n".join([fixed.name, *_told(told, fixed)])
     draw, lines, digest, before, log = fixed.drawn(), [fixed.name], hashlib.sha256(), "", CauseLog()
     observed = hashlib.sha256()
@@ -158,6 +158,15 @@ def _told(told: Callable[[random.Random], Iterable[tuple[str, str]]], fixed: Fix
             digest.update(text.encode())
     yield ", ".join(f"{what} {counts[what]}" for what in sorted(counts) if what)
     yield digest.hexdigest()[:12]
+
+
+def _seen(chance: random.Random) -> Iterator[tuple[str, str]]:
+    for facts, found in judged(chance.randrange(10**9)):
+        yield "", str(_plain(facts))
+        yield from ((each.code.value, str(each)) for each in found)
+
+
+_WITHOUT_A_RIG: Final = {"facts": said_of, "trials": answers, "arrivals": _seen}
 
 
 def _plain(value: Any) -> Any:

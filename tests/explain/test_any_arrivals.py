@@ -1,25 +1,14 @@
 """Whatever is stamped and received, and whenever, is observed, judged and tried without an error."""
 
 import random
-from collections.abc import Iterator
 
 import pytest
 
-from syncrelay.config import load_text
-from syncrelay.explain import Arrivals, Code, Endpoint, FindingLog, GroupWatch, InputGraph, Judge, Severity, with_ok
+from syncrelay.explain import Code, Severity
 from syncrelay.explain.causes import EXPLAINS, explained_by
-from syncrelay.sync import Match, Message
-from tests.explain.support.groups import S
+from tests.bank.any_arrivals import judged
 from tests.faults.extent import chosen
-from tests.ros.cdr_messages import VECTOR
-from tests.ros.configs import config, inputs
 
-_TOPICS = inputs({"/a": VECTOR, "/b": VECTOR})
-_SLOP = {"policy": "approximate_time", "slop": "20ms"}
-_HELD = {"policy": "latest_time", "trigger": "/a", "max_age": "1s", "topics": _TOPICS}
-_OPTIONAL = {**_SLOP, "max_wait": "100ms", "topics": [_TOPICS[0], {**_TOPICS[1], "required": False}]}
-_PAIR, _TICKS = {**_SLOP, "topics": _TOPICS}, {**_HELD, "trigger": "20 Hz"}
-_GROUPS = load_text(config({"held": _HELD, "optional": _OPTIONAL, "pair": _PAIR, "ticks": _TICKS})).groups
 # The last ones have failed: of an input that lost its clock, and then had no stamp, and of one too late for any wait.
 _SEEDS = (
     *(chosen(short=1, long=random.randrange(10**9)) + n for n in range(chosen(short=20, long=3000))),
@@ -28,39 +17,9 @@ _SEEDS = (
 )
 
 
-def _looks(chance: random.Random) -> Iterator[tuple[int, list[Arrivals]]]:
-    now = chance.choice([0, 1_700_000_000 * S])
-    for _ in range(chance.randint(1, 60)):
-        now = max(0, now + chance.choice([S, S, S, 0, 10 * S, -5 * S, 3600 * S]))
-        yield now, [_arrivals(chance, now) for _ in _TOPICS]
-
-
-def _arrivals(chance: random.Random, now: int) -> Arrivals:
-    came = []
-    for _ in range(chance.choice([0, 1, 3, 20])):
-        at = max(0, now - chance.randint(0, S))
-        stamps = at, at, at + chance.randint(-(10**6), 10**6), 0, chance.randint(-(2**63), 2**63 - 1), at // 1000
-        came.append((chance.choice([*stamps, at % S, at // 10**7 * 10**7, 2**63 - 1]), at))
-    return sorted(came, key=lambda each: each[1])
-
-
 @pytest.mark.parametrize("seed", _SEEDS)
 def test_any_messages_are_judged(seed: int):
-    group, chance = _GROUPS[seed % len(_GROUPS)], random.Random(f"graph {seed}")
-    publishers = (Endpoint("/x", VECTOR),) * chance.randint(0, 4)
-    graph = [InputGraph(topic.topic, topic.output, publishers) for topic in group.topics]
-    by_clock = chance.choice([None, lambda at: at // 2])
-    looks = [*_looks(random.Random(seed))]
-    watch, judge, log, engine = GroupWatch(group, began=looks[0][0]), Judge(), FindingLog(), group.engine()
-    for now, arrivals in looks:
-        came = sorted((at, index, stamp) for index, new in enumerate(arrivals) for stamp, at in new)
-        outcomes = [each for at, index, stamp in came for each in engine.add(Message(index, stamp, at), now=at)]
-        sent = [(each.stamps, 0) for each in outcomes if isinstance(each, Match)]
-        watch.add(arrivals, sent, engine.counts(), engine.sets, by_clock=by_clock, now=now)
-        facts = watch.facts(graph, now=now)
-        judged = judge.judge(facts)
-        list(log.remarks(facts, judged, judge.explained(facts)))
-        found = with_ok(facts, judged)
+    for facts, found in judged(seed):
         assert found
         assert all(each.text for each in found)
         said = {each.code for each in found}
