@@ -149,7 +149,9 @@ def _near(value: Any, chance: random.Random, *, is_as_long: bool = False) -> Any
     match value:
         case Distribution():
             kept = value.newest(len(value) if is_as_long else chance.choice(_COUNTS))
-            return Distribution([_number_near(each, chance) for each in kept])
+            two = chance.choices(_ROUND, k=2)
+            of_two = chance.random() < 0.5
+            return Distribution([chance.choice(two) if of_two else _number_near(each, chance) for each in kept])
         case dict():
             return {key: _number_near(each, chance) for key, each in value.items()}
         case tuple() | list() if not hasattr(value, "_fields"):
