@@ -154,4 +154,4 @@ def test_what_piles_up_while_an_input_is_silent_is_bounded():
 
 def test_an_offset_does_not_turn_the_latest_stamp_into_the_earliest():
     (stamps, *_) = as_arrays([Message(0, 2**63 - 1, BEGAN)], 1)
-    assert shifted(stamps.stamps, 1)[0] > 0
+    assert shifted(stamps.stamps[:], 1)[0] > 0
