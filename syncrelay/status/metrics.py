@@ -41,7 +41,7 @@ class Family(NamedTuple):
 def exposition(state: RelayState, accept: str = "") -> tuple[bytes, str]:
     """Return the metrics in a format that a scraper accepts, and its content type.
 
-    Written here, because prometheus_client takes nine times as long: 54 ms for the 5,000 samples of 100 groups.
+    Written here, because prometheus_client takes nine times as long: 56 ms for 100 groups.
     """
     if _OPEN_METRICS in accept:
         text = "".join(_written(families(state), _open_metrics_head))
