@@ -137,7 +137,6 @@ def alone(facts: GroupFacts) -> Found:
         no_other_node(graph),
         "start the robot's nodes; if they are running, compare ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and"
         " RMW_IMPLEMENTATION on both sides, and run `syncrelay doctor --live`",
-        Severity.ERROR if facts.is_silent else Severity.WARN,
     )
 
 
