@@ -130,8 +130,12 @@ def _sets(each: GroupAnalysis) -> str:
     together = f"{suggestion.now} of {counted(suggestion.possible, 'possible set')}"
     if sets == suggestion.now:
         return together
-    after = "thinning" if each.group.options.transforms is None else "waiting for transforms"
-    return f"{counted(sets, 'set')} after {after}, {together}"
+    options = each.group.options
+    if options.transforms is not None:
+        return f"{counted(sets, 'set')} after waiting for transforms, {together}"
+    if options.every > 1 or options.max_rate:
+        return f"{counted(sets, 'set')} after thinning, {together}"
+    return f"{counted(sets, 'set')}, {together}: the others are not of the nearest messages"
 
 
 def _fates(row: InputFates) -> Iterator[str]:

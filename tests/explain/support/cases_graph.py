@@ -113,6 +113,9 @@ FOUND = {
     "a bundle that another node publishes": a_group(
         bundle=BundleGraph("/set", rivals=(Endpoint("/bag", IMAGE),), rivals_since=NOW - 3 * S)
     ),
+    "an output beside a bundle that another node publishes": a_group(
+        camera(rivals=(Endpoint("/bag", IMAGE),), rivals_since=NOW - 3 * S), LIDAR, bundle=BundleGraph("/set")
+    ),
     "all inputs that fell silent together": a_silent_group(
         camera(figures=QUIET), an_input("/lidar", figures={**QUIET, "last_received": NOW - 8 * S})
     ),

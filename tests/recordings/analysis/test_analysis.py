@@ -10,10 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.explain import UNREADABLE, Code
-from syncrelay.recordings.analysis.analysis import analyze_group, group_of
+from syncrelay.recordings.analysis.analysis import Analysis, analyze_group, group_of
 from syncrelay.recordings.analysis.curves import curves_of
 from syncrelay.recordings.analysis.evaluation import evaluate, looked_at
 from syncrelay.recordings.analysis.pairs import pair
+from syncrelay.recordings.analysis.report_text import report
 from syncrelay.recordings.analysis.streams import Stream, stamped
 from syncrelay.recordings.analysis.topics import figures_of
 from syncrelay.recordings.analysis.watching import watch_group
@@ -255,3 +256,19 @@ def test_few_seconds_of_a_pause_are_looked_at_and_they_stand_for_all(seconds):
     assert len(looks) <= 32 + 63
     assert looks[:16] == list(range(1, min(16, max(0, seconds)) + 1))
     assert looks[-16:] == list(range(max(1, seconds - 15), seconds + 1))
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({}, "50 sets, 48 of 50 possible sets: the others are not of the nearest messages"),
+        ({"age_penalty": 0}, "50 of 50 possible sets"),
+        ({"every": 2}, "25 sets after thinning, 48 of 50 possible sets"),
+    ],
+)
+def test_it_is_said_why_more_or_fewer_sets_left_than_there_were_possible(keys, said):
+    streams = streams_of(every(100 * MS, 50), every(60 * MS, 83, jitter=20 * MS))
+    group = {"policy": "approximate_time", "slop": "40ms", **keys, "topics": inputs({"/a": VECTOR, "/b": VECTOR})}
+    text = config({"front": group})
+    lines = report("rig.mcap", Analysis(BEGIN, BEGIN, (), (_analyzed(streams, text),), text, ()))
+    assert next(line for line in lines if "possible" in line) == f"  {said}"
