@@ -43,7 +43,8 @@ def _group(flow, **keys) -> GroupRelay:
     topics = [*inputs({"/left": VECTOR}), *inputs({"/right": VECTOR}, required=False)]
     bundle = {"topic": "/set", "type": "rig_msgs/msg/Set"}
     base = {"policy": "exact_time", "max_wait": "1s", "bundle": bundle, "outputs": False, "topics": topics}
-    return GroupRelay(load_text(config({"front": {**base, **keys}})).groups[0], now=lambda: 0, flow=flow)
+    given = {key: value for key, value in {**base, **keys}.items() if value is not None}
+    return GroupRelay(load_text(config({"front": given})).groups[0], now=lambda: 0, flow=flow)
 
 
 def _bundle(group: GroupRelay) -> Bundle:
@@ -77,6 +78,27 @@ def test_each_set_is_published_once_with_its_number_and_what_is_missing(flow):
         _whole(1, first[4:], first[4:], none, BEGIN, BEGIN),
         _whole(2, second[4:], empty, right, BEGIN + MS, 0),
     ]
+
+
+@pytest.mark.parametrize("flow", FLOWS)
+def test_sets_that_leave_at_once_are_bundled_whichever_input_comes_last(flow):
+    topics = inputs({"/left": VECTOR, "/right": VECTOR})
+    group, outlet, rights = _group(flow, topics=topics, outputs=True, max_wait=None), Outlet(), [Outlet(), Outlet()]
+    connect(group, rights)
+    group.connect_bundle(_bundle(group), outlet)
+    contents = [vector(BEGIN + number * MS, frame_id="") for number in range(4)]
+    for number, content in enumerate(contents):
+        for index in (0, 1) if number % 2 else (1, 0):
+            group.flow.receive(index, _payload(content), BEGIN + number * MS)
+    none = struct.pack("<I", 0)
+    stamps = [BEGIN + number * MS for number in range(4)]
+    assert outlet.log == [
+        _whole(number + 1, content[4:], content[4:], none, stamps[number], stamps[number])
+        for number, content in enumerate(contents)
+    ]
+    assert [each.log for each in rights] == [contents, contents]
+    assert [each for each, _ in group.flow.watched().sets] == [(stamp, stamp) for stamp in stamps]
+    assert group.engine.sets == group.flow.n_sets == 4
 
 
 @pytest.mark.parametrize("flow", FLOWS)

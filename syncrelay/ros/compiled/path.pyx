@@ -921,7 +921,7 @@ cdef class Flow:
 
     cdef bint _is_told_of(self) except -1:
         """Whether more is to be done of a set than to publish its messages."""
-        return self._tape.is_on or self.bundle is not None or (self.manifests is not None and self.manifests.is_heard)
+        return self._tape.is_on or (self.manifests is not None and self.manifests.is_heard)
 
     cdef int _leave(self) except -1:
         """Publish the set that is whole."""
@@ -929,6 +929,10 @@ cdef class Flow:
         cdef int64_t received = lent.close()
         cdef Row * last = &lent.rows[lent.n_rows - 1]
         cdef Py_ssize_t index
+        if self.bundle is not None:
+            messages = [Message(index, lent.newest[index], lent.payloads[index]) for index in range(lent.n_inputs)]
+            self.bundle.send(Match(tuple(messages)), self.n_sets + 1)
+            del messages
         for index in range(lent.n_inputs):
             payload = lent.payloads[index]
             lent.payloads[index] = None
