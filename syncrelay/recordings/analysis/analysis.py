@@ -21,7 +21,7 @@ from syncrelay.recordings.analysis.unneeded import InputFates, Unneeded, find_un
 from syncrelay.recordings.analysis.watching import LastingFinding, watch_group
 from syncrelay.recordings.bag.bindings import GroupBinding
 from syncrelay.recordings.bag.recording import Recording
-from syncrelay.recordings.side_by_side import side_by_side
+from syncrelay.recordings.forks import side_by_side
 
 
 # No slots: what takes long is found when it is first asked for, and kept.

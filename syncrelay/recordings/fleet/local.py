@@ -4,14 +4,13 @@ All modules are imported before the fork. A process ends with its recording: tha
 kills it because memory runs out, the other recordings are not affected.
 """
 
-import multiprocessing
 import os
 import resource
 import signal
-import warnings
 from collections.abc import Generator, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkProcess
 from pathlib import Path
@@ -19,7 +18,8 @@ from typing import Final
 
 from syncrelay.recordings.bag.definitions import jazzy_definition
 from syncrelay.recordings.fleet.job import TICK_S, TRIES, Failed, Finished, Job, Outcome, given_up, took_too_long
-from syncrelay.recordings.fleet.work import end_with_parent, perform
+from syncrelay.recordings.fleet.work import perform
+from syncrelay.recordings.forks import fork
 
 LEAST_MEMORY: Final = 1_000_000_000
 """What a worker may take in bytes, however many work at a time."""
@@ -84,15 +84,7 @@ class LocalEngine:
                 worker.process.join()
 
     def _fork(self, job: Job, attempt: int) -> _Worker:
-        context = multiprocessing.get_context("fork")
-        outcome, into = context.Pipe(duplex=False)
-        process = context.Process(target=_work, args=(job, os.getpid(), into, self._memory), daemon=True)
-        with warnings.catch_warnings():
-            # About threads: those of numpy and pyarrow are idle, and are made anew in the child.
-            warnings.simplefilter("ignore", DeprecationWarning)
-            process.start()
-        into.close()
-        return _Worker(job, attempt, process, outcome)
+        return _Worker(job, attempt, *fork(partial(_work, job, self._memory)))
 
 
 def machine_memory() -> int:
@@ -105,16 +97,9 @@ def machine_memory() -> int:
     return min(whole, int(limit)) if limit.strip().isdigit() else whole
 
 
-def _work(job: Job, parent: int, outcome: Connection, memory: int) -> None:
-    # A terminal sends Ctrl-C to all processes: the parent decides what it means.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for number in (signal.SIGTERM, signal.SIGALRM):
-        signal.signal(number, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
-    end_with_parent()
-    if os.getppid() == parent:
-        resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
-        outcome.send(perform(job))
+def _work(job: Job, memory: int, outcome: Connection) -> None:
+    resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+    outcome.send(perform(job))
 
 
 def _outcome(worker: _Worker) -> Outcome | None:

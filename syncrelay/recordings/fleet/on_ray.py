@@ -14,7 +14,8 @@ from typing import Any, Final
 
 from syncrelay.errors import SyncRelayError
 from syncrelay.recordings.fleet.job import TICK_S, TRIES, Failed, Finished, Job, Outcome, given_up
-from syncrelay.recordings.fleet.work import end_with_parent, perform
+from syncrelay.recordings.fleet.work import perform
+from syncrelay.recordings.forks import end_with_parent
 
 MEMORY: Final = 1_000_000_000
 """What each task declares to take, in bytes: Ray begins no more tasks on a node than fit."""

@@ -1,6 +1,5 @@
 """What a worker does with one recording, on this machine or on another."""
 
-import ctypes
 import shutil
 import signal
 import socket
@@ -16,7 +15,6 @@ from syncrelay.recordings.fleet.job import Done, Failed, Job, Kept, Outcome
 from syncrelay.recordings.fleet.ledger import LEDGER, Entry
 
 _NS_PER_SECOND: Final = 1_000_000_000
-_PR_SET_PDEATHSIG: Final = 1
 
 
 def perform(job: Job) -> Outcome:
@@ -29,11 +27,6 @@ def perform(job: Job) -> Outcome:
         return _performed(job)
     finally:
         _end_after(0)
-
-
-def end_with_parent() -> None:
-    """Have the kernel kill this process when its parent ends, however that ends."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _end_after(duration: int) -> None:

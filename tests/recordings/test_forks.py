@@ -2,11 +2,14 @@
 
 import os
 import signal
+import time
 from functools import partial
+from pathlib import Path
 
 import pytest
 
-from syncrelay.recordings.side_by_side import side_by_side
+from syncrelay.recordings.forks import side_by_side
+from tests.ros.processes import wait_until
 
 
 @pytest.fixture(autouse=True)
@@ -18,6 +21,21 @@ def test_results_are_in_the_order_of_the_calls_and_every_other_one_is_made_elsew
     found = side_by_side([partial(lambda number: (number, os.getpid()), number) for number in range(5)])
     assert [number for number, _ in found] == [0, 1, 2, 3, 4]
     assert [process == os.getpid() for _, process in found] == [True, False, True, False, True]
+
+
+def test_what_works_elsewhere_ends_with_an_error_here(tmp_path):
+    def asleep() -> None:
+        (tmp_path / str(os.getpid())).touch()
+        time.sleep(600)
+
+    def failing() -> None:
+        wait_until(lambda: list(tmp_path.iterdir()), "the other process")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        side_by_side([failing, asleep])
+    (other,) = tmp_path.iterdir()
+    assert not Path(f"/proc/{other.name}").exists()
 
 
 def test_an_error_elsewhere_is_raised_here():
