@@ -85,8 +85,11 @@ def _ranked(stretches: Stretches, ranks: Sequence[int], count: int, least: int, 
     if count <= _AT_ONCE:
         ordered = np.sort(np.concatenate([*within()]))
         return [int(ordered[rank]) for rank in ranks]
-    width = (greatest - least) // _PARTS + 1
-    counts = sum((np.bincount((some - least) // width, minlength=_PARTS) for some in within()), np.zeros(_PARTS, int))
+    width, counts = (greatest - least) // _PARTS + 1, np.zeros(_PARTS, dtype=np.int64)
+    for some in within():
+        # Unsigned, as two numbers may be farther apart than an int64 can say.
+        beyond = some.astype(np.uint64) - np.uint64(least % 2**64)
+        counts += np.bincount((beyond // np.uint64(width)).astype(np.int64), minlength=_PARTS)
     ends = np.cumsum(counts)
     parts = np.searchsorted(ends, ranks, side="right").tolist()
     found: dict[int, int] = {}
