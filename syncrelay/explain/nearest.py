@@ -3,7 +3,7 @@
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import accumulate, chain
 from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
@@ -23,6 +23,8 @@ _KEPT: Final = 5_000
 # Stands for "no message on this side". Twice this still fits into 64 bits.
 _FAR: Final = 2**61
 _LATEST: Final = 2**62 - 1
+# Later than any stamp.
+_NEVER: Final = 2**63
 LONGEST: Final = _LATEST
 """No offset or wait longer than this, 146 years, is tried: as a duration of the file it might be out of range."""
 # Stamps are meant to be equal if this share of them is. One that is not has lost its partner.
@@ -111,17 +113,20 @@ def as_arrays(messages: Sequence[Message], n_inputs: int) -> tuple[Received, ...
 
 def in_order(messages: Received, offset: int) -> InOrder:
     """Sort an input's messages by stamp. Of messages with one stamp the last counts, as it does in the engine."""
-    least = [int(stamps.min(initial=_LATEST)) for stamps, _, _ in messages.stamped()]
+    least = [int(stamps.min()) if len(stamps) else _NEVER for stamps, _, _ in messages.stamped()]
     # Stamps below the least that is still to come are in order once they are sorted.
-    to_come = np.minimum.accumulate([2**63 - 1, *reversed(least)])[-2::-1].tolist()
-    ordered, held = Rows(2), np.zeros((0, 2), dtype=np.int64)
-    for (stamps, _, places), bound in zip(messages.stamped(), to_come, strict=True):
-        held = np.concatenate([held, np.stack([stamps, places], axis=1)])
-        if not len(held) or held[:, 0].min() >= bound:
+    to_come = [*accumulate(reversed(least), min, initial=_NEVER)][-2::-1]
+    ordered, waiting, lowest = Rows(2), list[Nanoseconds](), _NEVER
+    for (stamps, _, places), own, bound in zip(messages.stamped(), least, to_come, strict=True):
+        waiting.append(np.stack([stamps, places], axis=1))
+        lowest = min(lowest, own)
+        if lowest >= bound:
             continue
+        held = np.concatenate(waiting)
         held = held[np.argsort(held[:, 0], kind="stable")]
-        some = held[: np.searchsorted(held[:, 0], bound)]
-        held = held[len(some) :]
+        count = len(held) if bound == _NEVER else int(np.searchsorted(held[:, 0], bound))
+        some, waiting = held[:count], [held[count:]]
+        lowest = int(held[count, 0]) if count < len(held) else _NEVER
         some = some[np.append(some[1:, 0] != some[:-1, 0], [True])]
         ordered.append(np.stack([shifted(some[:, 0], offset), some[:, 1]], axis=1))
     return InOrder(ordered.column(0), ordered.column(1), messages.places)
