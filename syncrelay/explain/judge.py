@@ -25,6 +25,7 @@ from syncrelay.explain import (
     rules_graph,
     rules_matching,
     rules_offset,
+    rules_outputs,
     rules_stamps,
     rules_transforms,
     words,
@@ -64,7 +65,7 @@ _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     Rule(Code.ALONE, rules_graph.alone),
     Rule(Code.NO_PUBLISHER, rules_graph.no_publisher),
     of_each_input(Code.INCOMPATIBLE_QOS, rules_graph.incompatible_qos),
-    Rule(Code.NOBODY_LISTENS, rules_graph.nobody_listens),
+    Rule(Code.NOBODY_LISTENS, rules_outputs.nobody_listens),
     Rule(Code.NO_CLOCK, rules_graph.no_clock),
     Rule(Code.CLOCK_STOPPED, rules_graph.clock_stopped),
     Rule(Code.TOO_SLOW, rules_flow.too_slow),
@@ -96,10 +97,10 @@ _MATCHING_RULES: Final[tuple[Rule, ...]] = (
 """What they suggest they try, which costs: they are not asked for what a cause explains."""
 
 _OTHER_RULES: Final[tuple[Rule, ...]] = (
-    of_each_input(Code.SUBSCRIBER_QOS, rules_graph.subscriber_qos),
-    Rule(Code.SUBSCRIBER_QOS, rules_graph.bundle_subscriber_qos),
-    of_each_input(Code.OUTPUT_TAKEN, rules_graph.output_taken),
-    Rule(Code.OUTPUT_TAKEN, rules_graph.bundle_taken),
+    of_each_input(Code.SUBSCRIBER_QOS, rules_outputs.subscriber_qos),
+    Rule(Code.SUBSCRIBER_QOS, rules_outputs.bundle_subscriber_qos),
+    of_each_input(Code.OUTPUT_TAKEN, rules_outputs.output_taken),
+    Rule(Code.OUTPUT_TAKEN, rules_outputs.bundle_taken),
 )
 _FEW_SETS: Final = Rule(Code.FEW_SETS, rules_matching.few_sets)
 

@@ -9,7 +9,8 @@ import numpy as np
 from syncrelay.clock import UNREADABLE
 from syncrelay.config import GroupConfig
 from syncrelay.explain.dry_run import EngineDriver
-from syncrelay.explain.nearest import Nanoseconds, PossibleSets, extents
+from syncrelay.explain.nearest import Nanoseconds, extents
+from syncrelay.explain.possible_sets import PossibleSets
 from syncrelay.explain.rows import BLOCK
 from syncrelay.sync import Match, Message, Outcome
 

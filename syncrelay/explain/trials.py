@@ -23,15 +23,14 @@ from syncrelay.explain.nearest import (
     LONGEST,
     InOrder,
     Nanoseconds,
-    PossibleSets,
     Received,
     in_order,
     period_of,
-    possible_sets,
     quantile,
     shifted,
     signed_distances,
 )
+from syncrelay.explain.possible_sets import PossibleSets, possible_sets
 from syncrelay.explain.rows import Column, Stretches, extent, median, quantiles
 from syncrelay.explain.set_spans import NOTHING, Run, match, of_one_moment
 from syncrelay.explain.widths import are_amid, tolerances, wander, with_headroom

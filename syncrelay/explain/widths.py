@@ -8,7 +8,8 @@ import numpy as np
 
 from syncrelay.config import Distance
 from syncrelay.explain import words
-from syncrelay.explain.nearest import Nanoseconds, PossibleSets, period_of, quantile, signed_distances
+from syncrelay.explain.nearest import Nanoseconds, period_of, quantile, signed_distances
+from syncrelay.explain.possible_sets import PossibleSets
 from syncrelay.explain.rows import Column
 
 _SECOND: Final = 1_000_000_000

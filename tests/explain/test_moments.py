@@ -15,7 +15,8 @@ import pytest
 from syncrelay.config import GroupConfig
 from syncrelay.explain.changes import Change, changed
 from syncrelay.explain.dry_run import EngineDriver
-from syncrelay.explain.nearest import as_arrays, possible_sets
+from syncrelay.explain.nearest import as_arrays
+from syncrelay.explain.possible_sets import possible_sets
 from syncrelay.explain.trials import REQUIRED, Trials
 from syncrelay.sync import DropReason, Match, Message, Outcome
 from tests.explain.scenario import BEGAN, MS, Source, group_of

@@ -9,15 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.config import Distance
-from syncrelay.explain.nearest import (
-    NearestSpans,
-    Received,
-    as_arrays,
-    in_order,
-    possible_sets,
-    shifted,
-    signed_distances,
-)
+from syncrelay.explain.nearest import NearestSpans, Received, as_arrays, in_order, shifted, signed_distances
+from syncrelay.explain.possible_sets import possible_sets
 from syncrelay.explain.rows import BLOCK
 from syncrelay.sync import Message
 from tests.explain.scenario import BEGAN, MS, Source, group_of
@@ -132,7 +125,7 @@ def test_possible_sets_are_the_same_whatever_stretches_they_are_found_in(policy,
 
 
 def _possible(group, messages, monkeypatch, size):
-    monkeypatch.setattr("syncrelay.explain.nearest.BLOCK", size)
+    monkeypatch.setattr("syncrelay.explain.possible_sets.BLOCK", size)
     found = possible_sets(group, as_arrays(messages, 3), (0, 1, 2), is_window=False)
     assert found is not None
     return found

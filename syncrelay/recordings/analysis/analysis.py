@@ -7,7 +7,8 @@ from itertools import combinations
 
 from syncrelay.config import GroupConfig, load_text
 from syncrelay.config.load import spelt_out
-from syncrelay.explain.nearest import LONGEST, PossibleSets
+from syncrelay.explain.nearest import LONGEST
+from syncrelay.explain.possible_sets import PossibleSets
 from syncrelay.explain.trials import Trials
 from syncrelay.recordings.analysis.changes import Change, with_changes
 from syncrelay.recordings.analysis.curves import Curves, curves_of

@@ -7,7 +7,8 @@ from typing import Final
 
 from syncrelay.config import GroupConfig
 from syncrelay.explain.changes import Change, changed
-from syncrelay.explain.nearest import PossibleSets, as_arrays, quantile
+from syncrelay.explain.nearest import as_arrays, quantile
+from syncrelay.explain.possible_sets import PossibleSets
 from syncrelay.explain.trials import Trials
 from syncrelay.recordings.analysis.streams import Stream, messages, stamped
 from syncrelay.sync.queues import LONGEST_QUEUE
