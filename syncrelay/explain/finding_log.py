@@ -70,20 +70,29 @@ class FindingLog:
         self._start: int | None = None
         self._silence = ""
         self._over: deque[Spell] = deque(maxlen=_KEPT)
-        self.n_over = 0
-        """How many spells are over; the last five are in `spells`."""
+        self._n_over = 0
+        # When sets began to leave again, though not enough of them yet to call it over.
+        self._back_at: int | None = None
+
+    @property
+    def n_left_out(self) -> int:
+        """How many spells are over that are not in `spells`."""
+        return self._n_over - len(self._over)
 
     @property
     def spells(self) -> tuple[Spell, ...]:
         """What was wrong, in the order in which it ended; what still holds comes last."""
         holds = [(each.began, each.finding.text) for each in self._warned.values() if each.holds]
+        start = self._start or 0
+        spells = [*self._over, *(Spell(began - start, None, text) for began, text in holds)]
         if self._is_silence_logged and self._quiet_since is not None:
-            holds.append((self._quiet_since, self._silence))
-        return (*self._over, *(Spell(began - (self._start or 0), None, text) for began, text in holds))
+            lasted = None if self._back_at is None else self._back_at - self._quiet_since
+            spells.append(Spell(self._quiet_since - start, lasted, self._silence))
+        return tuple(spells)
 
     def _end(self, began: int, ended: int, text: str) -> None:
         self._over.append(Spell(began - (self._start or 0), ended - began, text))
-        self.n_over += 1
+        self._n_over += 1
 
     def remarks(
         self, facts: GroupFacts, findings: tuple[Finding, ...], explained: Collection[Code] = ()
@@ -104,6 +113,7 @@ class FindingLog:
             for (code, _), warning in self._warned.items():
                 warning.holds = warning.holds and code not in explained
         if facts.is_silent:
+            self._back_at = None
             worst = explanation(findings) if findings else None
             if worst is not None and worst.severity is Severity.ERROR:
                 errors = (each for each in findings if each.severity is Severity.ERROR)
@@ -119,6 +129,7 @@ class FindingLog:
                 self._end(self._quiet_since, now, self._silence)
                 yield Remark(Severity.OK, f"recovered after {words.seconds(now - self._quiet_since)}")
             self._quiet_since, self._is_silence_logged, self._well_since = None, False, now
+        self._back_at = (self._back_at or last) if self._quiet_since is not None and is_back else None
         yield from self._warnings(facts, findings, explained, now)
 
     def _set_back(self, by: int) -> None:
@@ -127,6 +138,8 @@ class FindingLog:
             self._start -= by
         if self._quiet_since is not None:
             self._quiet_since -= by
+        if self._back_at is not None:
+            self._back_at -= by
         self._log_again -= by
         self._well_since -= by
         for warning in self._warned.values():

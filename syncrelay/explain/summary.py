@@ -36,11 +36,9 @@ def summarize(
 
 
 def _spells(group: str, log: FindingLog) -> Iterator[str]:
-    spells = log.spells
-    left_out = log.n_over - sum(each.lasted is not None for each in spells)
-    if left_out:
-        yield f"{group}:   {counted(left_out, 'earlier finding')} in the log above"
-    for each in spells:
+    if log.n_left_out:
+        yield f"{group}:   {counted(log.n_left_out, 'earlier finding')} in the log above"
+    for each in log.spells:
         lasted = "until the end" if each.lasted is None else f"for {words.seconds(each.lasted)}"
         began = f"{words.seconds(each.after)} after the start" if each.after >= _SOON_NS else "from the start"
         yield f"{group}:   {began}, {lasted}: {each.text}"

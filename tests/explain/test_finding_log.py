@@ -1,10 +1,13 @@
 """What is worth a line in the log, and when."""
 
+from dataclasses import replace
+
 import pytest
 
 from syncrelay.explain import Code, Finding, FindingLog, GroupFacts, Severity, in_words, judge
 from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.report import GroupReport
+from syncrelay.explain.standing import Standing
 from syncrelay.explain.summary import log_summary
 from tests.explain.support.groups import BEGAN, NOW, S, a_group, an_input
 
@@ -121,8 +124,14 @@ def test_what_was_wrong_is_said_once_more_at_the_end(summary):
     log = FindingLog()
     looked(log, at(5, last_set=None))
     assert summary(log) == [f"from the start, until the end: no sets: {WHO}"]
-    looked(log, at(9, last_set=8.9))
-    assert summary(log) == [f"from the start, for 9 s: no sets: {WHO}"]
+    # Sets leave again, but too few to say so yet; then none, and then enough.
+    for second, last_set in ((7, 6), (8, 7.5)):
+        looked(log, replace(at(second, last_set=last_set), standing=Standing.FEW))
+        assert summary(log) == [f"from the start, for 6 s: no sets: {WHO}"]
+    looked(log, at(20, last_set=8))
+    assert summary(log) == [f"from the start, until the end: no sets: {WHO}"]
+    looked(log, at(21, last_set=20.9))
+    assert summary(log) == [f"from the start, for 21 s: no sets: {WHO}"]
 
 
 def test_of_what_was_wrong_often_the_last_five_are_said(summary):
