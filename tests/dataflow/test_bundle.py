@@ -99,6 +99,14 @@ def test_sets_that_leave_at_once_are_bundled_whichever_input_comes_last(flow):
     assert [each.log for each in rights] == [contents, contents]
     assert [each for each, _ in group.flow.watched().sets] == [(stamp, stamp) for stamp in stamps]
     assert group.engine.sets == group.flow.n_sets == 4
+    outlet.refusal = PublishError("no room")
+    for index in (0, 1):
+        group.flow.receive(index, _payload(contents[0]), BEGIN + 4 * MS)
+    assert group.unpublished == {group.bundle_index: (1, "no room", False)}
+    outlet.refusal = None
+    for index in (0, 1):
+        group.flow.receive(index, _payload(contents[0]), BEGIN + 5 * MS)
+    assert (group.unpublished, outlet.sent, len(rights[0].log), group.failure) == ({}, 5, 6, None)
 
 
 @pytest.mark.parametrize("flow", FLOWS)
