@@ -82,6 +82,8 @@ class Candidate:
 # Scalars on /diagnostics; manifests that someone hears; neither watching nor telling; sets and drops that are tapped;
 # sets as one message each.
 SWITCHES = {"scalars", "heard", "untold", "tapped", "bundled"}
+# How bench/floor.c is told to do the same, or to pass messages on once a set is whole.
+FLOOR_MODES = {"bundled": "joined", "held": "held"}
 
 
 class Workshop:
@@ -96,9 +98,9 @@ class Workshop:
         asked = dict(setting.partition("=")[::2] for setting in settings.split(",") if setting)
         python = asked.pop("PYTHON", sys.executable)
         if kind == "c":
-            joined = ["joined"] if asked.pop("bundled", None) == "" else []
-            bundles = load.outputs[:1] if joined else []
-            call = [python, "-c", CALL_MAIN, str(self._built_floor()), *joined, *_words(load)]
+            modes = [mode for name, mode in FLOOR_MODES.items() if asked.pop(name, None) == ""]
+            bundles = load.outputs[:1] if "joined" in modes else []
+            call = [python, "-c", CALL_MAIN, str(self._built_floor()), *modes, *_words(load)]
             return Candidate(word, load, call, asked, bundles=bundles, bundle_type=load.type_name)
         if kind == "typed":
             here = {"PYTHONPATH": str(HERE.parent)}

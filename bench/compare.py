@@ -4,7 +4,8 @@ A candidate is a checkout of syncrelay (`.`, `/path/to/another`), `c` (bench/flo
 (bench/typed_relay.py). Settings follow an @, with commas between: environment variables (`.@SYNCRELAY_RECEIVE=rclpy`)
 and the interpreter (`.@PYTHON=/path/to/python`); for a checkout also `heard` (its
 manifest has a subscriber), `scalars` (on /diagnostics), `tapped` (by `syncrelay tap`), `untold` (it neither watches
-itself nor tells of it) and `bundled` (each set leaves as one message). `c@bundled` joins the bytes of the messages.
+itself nor tells of it) and `bundled` (each set leaves as one message). `c@bundled` joins the bytes of the messages, and
+`c@held` passes them on when the last input has come, as whatever matches them must.
 
 Each is started once, between processes that publish and receive, and all are loaded at once, in rounds of a second. CPU
 is what all threads of its process ran, by the scheduler's count, per message that came out. Rounds in which neighbours

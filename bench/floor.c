@@ -1,8 +1,9 @@
 // The floor: a relay of bytes on rcl alone, which neither matches nor reads anything.
 //
-//     floor [joined] TYPE INPUT OUTPUT [TYPE INPUT OUTPUT ...]        TYPE is Image or Imu
+//     floor [held | joined] TYPE INPUT OUTPUT [TYPE INPUT OUTPUT ...]        TYPE is Image or Imu
 //
-// With `joined`, the bytes of a message from each input leave on the first output in one, once the last input has come.
+// With `held`, a message of each input waits until the last input has come, and then all leave; with `joined`, their
+// bytes leave on the first output in one.
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -48,9 +49,10 @@ static void append(rcl_serialized_message_t * to, const rcl_serialized_message_t
 
 int main(int argc, char ** argv)
 {
+  const int is_held = argc > 1 && strcmp(argv[1], "held") == 0;
   const int is_joined = argc > 1 && strcmp(argv[1], "joined") == 0;
-  argc -= is_joined;
-  argv += is_joined;
+  argc -= is_held || is_joined;
+  argv += is_held || is_joined;
   const size_t count = (size_t)(argc - 1) / 3;
   rcl_allocator_t allocator = rcl_get_default_allocator();
   rcl_init_options_t options = rcl_get_zero_initialized_init_options();
@@ -76,8 +78,11 @@ int main(int argc, char ** argv)
     require(rcl_publisher_init(&publishers[i], &node, type_of(words[0]), words[2], &output), words[2]);
   }
 
-  rcl_serialized_message_t message = rmw_get_zero_initialized_serialized_message();
-  require(rmw_serialized_message_init(&message, 0, &allocator), "message");
+  rcl_serialized_message_t * messages = calloc(count, sizeof(*messages));
+  for (size_t i = 0; i < count; ++i) {
+    messages[i] = rmw_get_zero_initialized_serialized_message();
+    require(rmw_serialized_message_init(&messages[i], 0, &allocator), "message");
+  }
   rcl_serialized_message_t whole = rmw_get_zero_initialized_serialized_message();
   require(rmw_serialized_message_init(&whole, 0, &allocator), "message");
   rcl_wait_set_t wait_set = rcl_get_zero_initialized_wait_set();
@@ -93,15 +98,17 @@ int main(int argc, char ** argv)
     for (size_t i = 0; i < count; ++i) {
       rmw_message_info_t info;
       while (wait_set.subscriptions[i] &&
-             rcl_take_serialized_message(&subscriptions[i], &message, &info, NULL) == RCL_RET_OK) {
-        if (!is_joined) {
-          require(rcl_publish_serialized_message(&publishers[i], &message, NULL), "publish");
+             rcl_take_serialized_message(&subscriptions[i], &messages[i], &info, NULL) == RCL_RET_OK) {
+        if (is_joined) {
+          append(&whole, &messages[i]);
+          if (i == count - 1) {
+            require(rcl_publish_serialized_message(&publishers[0], &whole, NULL), "publish");
+            whole.buffer_length = 0;
+          }
           continue;
         }
-        append(&whole, &message);
-        if (i == count - 1) {
-          require(rcl_publish_serialized_message(&publishers[0], &whole, NULL), "publish");
-          whole.buffer_length = 0;
+        for (size_t n = is_held ? 0 : i; n <= i && (!is_held || i == count - 1); ++n) {
+          require(rcl_publish_serialized_message(&publishers[n], &messages[n], NULL), "publish");
         }
       }
     }
