@@ -1,6 +1,6 @@
 """The suggester's values for a recording, as changes to a file with their reasons; and what no trial can find."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -27,6 +27,8 @@ _SECOND: Final = 1_000_000_000
 # Two evaluations have the same spans within this factor.
 _SAME_SPAN: Final = 1.02
 _UNSET: Final = 0.5
+# Of several ways, the one that changes least is taken, if it gives such a share of the sets.
+_AS_MANY: Final = 0.95
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,14 +94,16 @@ def _matching(
     if keys := group.options.matched_by:
         deciding = f"{all_of(f'`{key}`' for key in keys)} {'decide' if len(keys) > 1 else 'decides'}"
         return Suggestion((), (f"no values to suggest: {deciding} which messages belong together",), 0, 0, 0)
-    if stamping := list(_stamping(group, streams, trials)):
+    restamped = []
+    for stamping in _stampings(group, streams, trials):
         base = changed(stamping)
         by_base = trials_of(base, stamped(base, streams))
         now = min(len(by_base.spans()), len(evaluation.sets))
-        found = _suggested(by_base, stamped(base, streams), evaluation, changed, stamping, now=now)
-        # What comes seconds late looks like a clock that is off.
-        if found.then > trials.given(()):
-            return found
+        restamped.append(_suggested(by_base, stamped(base, streams), evaluation, changed, stamping, now=now))
+    most = max((each.then for each in restamped), default=0)
+    # What comes seconds late looks like a clock that is off.
+    if most > trials.given(()):
+        return next(each for each in restamped if each.then >= _AS_MANY * most)
     return _suggested(trials, streams, evaluation, changed, [], now=trials.given(()))
 
 
@@ -157,14 +161,19 @@ def _as_change(change: TriedChange, trials: Trials) -> Change:
     return Change(config.name, change.input, change.key, value, reason)
 
 
-def _stamping(group: GroupConfig, streams: Sequence[Stream], trials: Trials) -> Iterator[Change]:
-    """Go by arrival where stamps are unset, and bring together clocks that are far apart."""
+def _stampings(group: GroupConfig, streams: Sequence[Stream], trials: Trials) -> list[list[Change]]:
+    """Return ways to go by other stamps: where some are unset, by arrival there, or at all inputs."""
     figures = [figures_of(stream) for stream in streams]
-    unset = [each for each in figures if each.messages and each.unstamped > _UNSET * each.messages]
+    unset = {n: each for n, each in enumerate(figures) if each.messages and each.unstamped > _UNSET * each.messages}
     if unset:
-        reason = f"{unset[0].unstamped} of {unset[0].messages} messages of {unset[0].topic} have stamp 0"
-        yield from _by_arrival(group, reason)
-        return
+        first = next(iter(unset.values()))
+        reason = f"{first.unstamped} of {first.messages} messages of {first.topic} have stamp 0"
+        return [[*_by_arrival(group, inputs, reason)] for inputs in (unset, range(len(figures)))]
+    return [each for each in [[*_of_one_clock(group, trials)]] if each]
+
+
+def _of_one_clock(group: GroupConfig, trials: Trials) -> Iterator[Change]:
+    """Bring together clocks that are far apart."""
     for index, topic in enumerate(group.topics):
         apart, reason = abs(trials.apart(index)), ""
         offset = None if topic.offset_ns else trials.clock_offset(index)
@@ -194,15 +203,15 @@ def _is_open(trials: Trials, index: int) -> bool:
     return bool(is_off) and by_other_stamps(trials, index, keys=["clock"]).is_open
 
 
-def _by_arrival(group: GroupConfig, reason: str) -> Iterator[Change]:
-    """Go by arrival, with a tolerance, which stands until a better one is measured."""
+def _by_arrival(group: GroupConfig, inputs: Collection[int], reason: str) -> Iterator[Change]:
+    """Go by arrival at some inputs, with a tolerance, which stands until a better one is measured."""
     tolerance = group.options.tolerance
     if tolerance is not None and not tolerance.takes_times_of_arrival:
         if tolerance.wider_policy:
             yield Change(group.name, None, "policy", tolerance.wider_policy, reason)
         yield Change(group.name, None, tolerance.key, "10ms", reason)
     for index, topic in enumerate(group.topics):
-        if topic.stamp != "receive":
+        if index in inputs and topic.stamp != "receive":
             yield Change(group.name, index, "stamp", "receive", reason)
 
 

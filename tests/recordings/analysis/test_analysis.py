@@ -227,6 +227,21 @@ def test_a_recording_of_a_camera_and_a_lidar_that_are_apart_beside_an_imu_is_giv
     assert found.suggestion.changes[0].key == "slop"
 
 
+@pytest.mark.parametrize("own_clock_s", [0, 3], ids=["one clock", "two clocks"])
+@pytest.mark.parametrize("is_required", [True, False], ids=["required", "optional"])
+def test_arrival_is_offered_where_stamps_are_unset_and_elsewhere_only_if_that_brings_more(own_clock_s, is_required):
+    stamps = [every(100 * MS, 100, jitter=2 * MS, seed=seed) for seed in range(3)]
+    came = streams_of(*stamps)
+    unset = Stream.of("/c", VECTOR, [(0, stamp + 6 * MS, place) for place, stamp in enumerate(stamps[2])])
+    apart = _SECOND * own_clock_s
+    other = Stream.of("/b", VECTOR, [(stamp + apart, stamp + 5 * MS, place) for place, stamp in enumerate(stamps[1])])
+    topics = [*inputs({"/a": VECTOR, "/b": VECTOR}), {"topic": "/c", "type": VECTOR, "required": is_required}]
+    text = config({"front": {"policy": "approximate_time", "slop": "20ms", "max_wait": "50ms", "topics": topics}})
+    found = _analyzed([came[0], other, unset], text if not is_required else text.replace("max_wait: 50ms", ""))
+    offered = {change.topic for change in found.suggestion.changes if change.key == "stamp"}
+    assert offered == ({0, 1, 2} if own_clock_s else {2})
+
+
 def _watched(streams):
     group = group_of(_pair_of(), "front")
     found = watch_group(group, streams, evaluate(group, streams))
