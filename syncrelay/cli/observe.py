@@ -85,6 +85,7 @@ def _observe(
     with resting_collector():
         from syncrelay.cli.top import why_no_screen
         from syncrelay.recordings.analysis.live import LiveStreams, analyze_live
+        from syncrelay.relay.look import look
         from syncrelay.relay.ports import Purpose
         from syncrelay.relay.relay import Relay
         from syncrelay.ros.joining import joined
@@ -108,7 +109,7 @@ def _observe(
             if sys.stderr.isatty():
                 how_long = f"for {arguments.seconds:g} s ..." if arguments.seconds else "until Ctrl-C ends it ..."
                 say(f"observing {how_long}")
-            relay.look(arguments.seconds or math.inf, is_over=lambda: stop.requested)
+            look(relay, arguments.seconds or math.inf, is_over=lambda: stop.requested)
         seconds, state = time.monotonic() - began, relay.state()
     return seconds, state, tuple(analyze_live(config, groups, live))
 
@@ -117,12 +118,13 @@ def _show(relay: "Relay", stop: StopRequest) -> None:
     """Draw the screen of `top` until the user has seen enough; the relay's turns are taken on another thread."""
     from syncrelay.cli.top import show
     from syncrelay.logs import held_back
+    from syncrelay.relay.look import look
     from syncrelay.top.app import EndedError
 
     seen_enough = Event()
     with ThreadPoolExecutor(1) as thread, held_back():
         relay.evaluate()
-        stepping = thread.submit(relay.look, math.inf, is_over=lambda: stop.requested or seen_enough.is_set())
+        stepping = thread.submit(look, relay, math.inf, is_over=lambda: stop.requested or seen_enough.is_set())
 
         def source(_url: str) -> "Answer":
             if stepping.done():

@@ -148,6 +148,7 @@ def _observe(config: Config | None, ros_args: Sequence[str], node: str, *, secon
 
     require_rclpy()
     from syncrelay.relay.graph import snapshot  # noqa: PLC0415
+    from syncrelay.relay.look import look  # noqa: PLC0415
     from syncrelay.relay.ports import Purpose  # noqa: PLC0415
     from syncrelay.relay.relay import Relay  # noqa: PLC0415
     from syncrelay.ros.joining import joined, watch_graph  # noqa: PLC0415
@@ -161,7 +162,7 @@ def _observe(config: Config | None, ros_args: Sequence[str], node: str, *, secon
     except ConfigError:
         return None
     with relay:
-        reports = relay.look(seconds)
+        reports = look(relay, seconds)
         graph = snapshot(own)
         is_there = config.node.lifecycle and node in graph.nodes
         state = state_of(own.raw, node, patience_s=_PATIENCE_S) if is_there else None

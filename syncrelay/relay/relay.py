@@ -14,7 +14,7 @@ from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.calls import Calls
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError, SyncRelayError
-from syncrelay.explain import GroupReport, Severity, Tape
+from syncrelay.explain import GroupReport, Tape
 from syncrelay.logs import name_after
 from syncrelay.relay.bindings import GroupBindings
 from syncrelay.relay.bundles import Bundles
@@ -44,10 +44,6 @@ _POLL_S = 1.0
 _ASKED_S = 3.0
 # A failure that repeats at once must not take a whole core.
 _AFTER_FAILURE_S = 0.1
-# `look` goes on at most this much longer for groups that have just started.
-_LONGER_S = 10.0
-# So many sets in a row that should have come and did not are no chance, but do not tell why either.
-_DUE = 3
 _ACTIVE = (Phase.STARTING, Phase.RUNNING, Phase.PAUSED)
 _WITHOUT_GROUPS = (Phase.UNCONFIGURED, Phase.FINALIZED)
 # How long an end waits for reliable subscribers to acknowledge what was published on all outputs. They do so only at
@@ -87,7 +83,7 @@ class Relay:
         /tf is not installed.
         """
         self.node = node
-        self._runtime = runtime
+        self.runtime = runtime
         try:
             require_distinct_names(config, groups, node.resolve_topic)
             require_type(each for each in config.groups if groups is None or each.name in groups)
@@ -195,7 +191,7 @@ class Relay:
 
     def offer(self, services: Offered) -> None:
         """Offer services on the node. Their functions are called on its executor's thread, and must not wait."""
-        self._services = Services(self.node, services, bugs=self._bugs, runtime=self._runtime)
+        self._services = Services(self.node, services, bugs=self._bugs, runtime=self.runtime)
 
     def reload(self, config: Config) -> str:
         """Run the groups of a file that was read again, and say what changed.
@@ -206,7 +202,7 @@ class Relay:
             raise ReloadError(str(self._advice))
         changed = self._groups.reload(config)
         # New groups are to be evaluated at once.
-        self._next_evaluation = self._runtime.monotonic()
+        self._next_evaluation = self.runtime.monotonic()
         return changed
 
     def pause(self) -> str:
@@ -265,7 +261,7 @@ class Relay:
 
     def _enter(self, phase: Phase) -> None:
         self._phase = phase
-        self._next_evaluation = self._runtime.monotonic()
+        self._next_evaluation = self.runtime.monotonic()
 
     def refuse_reload(self, reason: str) -> None:
         """Report in `state` that a reload failed, and why."""
@@ -299,29 +295,15 @@ class Relay:
         with self._bugs.contained("polling the graph"):
             self._poll_graph()
             self._groups.announce()
-        if (now := self._runtime.monotonic()) >= self._next_evaluation:
+        if (now := self.runtime.monotonic()) >= self._next_evaluation:
             with self._bugs.contained("evaluating the groups"):
                 self._evaluate(self.monitor.evaluate if self._is_watched(now) else self.monitor.evaluate_in_turn)
         is_waiting = any(binding.waiting_for for binding in self._groups.bindings.all)
-        until_evaluation = max(0.0, self._next_evaluation - self._runtime.monotonic())
+        until_evaluation = max(0.0, self._next_evaluation - self.runtime.monotonic())
         rest_s = min(timeout_s, until_evaluation, _EAGER_POLL_S if is_waiting else _POLL_S)
         self.monitor.standstills.end()
         self._wake.wait(rest_s)
         self.monitor.standstills.end(rest=round(rest_s * 1e9))
-
-    def look(self, seconds: float, *, is_over: Callable[[], bool] = lambda: False) -> tuple[GroupReport, ...]:
-        """Run for a time, and return a report of each group.
-
-        It takes a little longer where a group without a set has just got its first messages, where its publishers may
-        not have been found yet, or where sets have just stopped.
-        """
-        end = self._runtime.monotonic() + seconds
-        latest = end + _LONGER_S
-        while not is_over() and (left := end - self._runtime.monotonic()) > 0:
-            self.step(left)
-            if self._runtime.monotonic() >= end and any(map(is_early, self.evaluate())):
-                end = min(end + EVALUATE_S, latest)
-        return self.evaluate()
 
     def _poll_graph(self) -> None:
         has_changed = self._graph_changes.seen()
@@ -349,7 +331,7 @@ class Relay:
         return self._evaluate(self.monitor.evaluate)
 
     def _evaluate(self, evaluate: Callable[[], None]) -> tuple[GroupReport, ...]:
-        self._next_evaluation = self._runtime.monotonic() + EVALUATE_S
+        self._next_evaluation = self.runtime.monotonic() + EVALUATE_S
         try:
             evaluate()
         except CancelledError:
@@ -362,7 +344,7 @@ class Relay:
 
     def state(self) -> RelayState:
         """The state of the relay, as last evaluated. Any thread."""
-        self._asked = now = self._runtime.monotonic()
+        self._asked = now = self.runtime.monotonic()
         listen = self._groups.config.listen
         return RelayState(
             node=self.node.name,
@@ -418,14 +400,4 @@ class Relay:
             with self._bugs.contained("serving services and the clock"):
                 self.node.serve()
                 return
-            self._runtime.sleep(_AFTER_FAILURE_S)
-
-
-def is_early(report: GroupReport) -> bool:
-    """Whether more will be known soon about why a group gives no set, or has just stopped doing so."""
-    facts = report.facts
-    is_incomplete = facts.is_discovering and not all(each.graph.publishers for each in facts.inputs)
-    due = facts.silent_for / 1e9 * facts.possible_hz
-    is_well = all(each.severity is Severity.OK for each in report.problems)
-    has_just_stopped = is_well and (facts.figures.share.is_pausing or due >= _DUE)
-    return facts.is_new or is_incomplete or has_just_stopped
+            self.runtime.sleep(_AFTER_FAILURE_S)

@@ -14,7 +14,7 @@ from syncrelay.doctor.graph import check_groups
 from syncrelay.explain import GroupFacts, GroupReport, explanation
 from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.findings import Finding
-from syncrelay.relay.relay import is_early
+from syncrelay.relay.look import is_early
 from syncrelay.top.observed import unhealthy
 from tests.bank.play import Drawn, Score, fit, is_of_rig, publishers_of, sets_of
 from tests.explain.scenario import run

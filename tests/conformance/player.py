@@ -20,6 +20,7 @@ from syncrelay.config.profile import Profile
 from syncrelay.explain.facts import InputFacts
 from syncrelay.explain.judge import explanation
 from syncrelay.relay.listening import Heard, Listener
+from syncrelay.relay.look import look
 from syncrelay.relay.ports import EndpointInfo, Purpose
 from syncrelay.relay.relay import Relay
 from syncrelay.status import status_of
@@ -166,17 +167,17 @@ class Player:
         node, backend = self._world.join(config, {}, Purpose.OBSERVE)
         self._observed: list[Any] = []
 
-        def look() -> None:
+        def observe() -> None:
             runtime, purpose = self._world.runtime, Purpose.OBSERVE
             began = runtime.monotonic()
             with Relay(config, node, backend, purpose=purpose, runtime=runtime) as relay:
-                reports = relay.look(seconds)
+                reports = look(relay, seconds)
             took = runtime.monotonic() - began
             self._note("looked for as long as asked", took >= seconds)
             self.seen.inside.append(f"looked for {took:.1f} s")
             self._observed.append(reports)
 
-        self._world.runtime.start("observe", look)
+        self._world.runtime.start("observe", observe)
 
     def observed(self) -> None:
         """What was observed is noted."""

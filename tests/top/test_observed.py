@@ -1,7 +1,7 @@
 """What `observe` ends with, by the reports of its groups."""
 
 from syncrelay.explain import GroupReport, judge
-from syncrelay.relay.relay import is_early
+from syncrelay.relay.look import is_early
 from syncrelay.top.observed import unhealthy
 from tests.explain.scenario import Source, always, nothing, run
 from tests.explain.support.groups import NOW, S, a_group, an_input
