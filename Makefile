@@ -7,7 +7,7 @@ ROS ?= ros
 CONSTRAINTS ?= -c .ci/constraints.txt
 BIN := $(VENV)/bin
 # A change of these takes a new installation: the compiled path is built by it.
-BUILT_OF := pyproject.toml .ci/constraints.txt setup.py syncrelay/ros/compiled/path.pyx syncrelay/ros/compiled/at_once.pxi docker/build_messages.py
+BUILT_OF := pyproject.toml .ci/constraints.txt setup.py syncrelay/ros/compiled/path.pyx $(wildcard syncrelay/ros/compiled/*.pxi) docker/build_messages.py
 # What the wheels of ROS lack of what the tests need.
 BUILD_TF2_MSGS = $(BIN)/python docker/build_messages.py docker/messages/tf2_msgs >/dev/null \
 	|| echo "tf2_msgs could not be built (it takes g++): tests with transforms are skipped" >&2

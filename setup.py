@@ -9,8 +9,8 @@ from setuptools.command.build_ext import build_ext
 from setuptools.errors import BaseError, CCompilerError
 
 _SOURCE = Path("syncrelay/ros/compiled/path.pyx")
-_INCLUDED = _SOURCE.with_name("at_once.pxi")
-_FINGERPRINT = hashlib.sha256(_SOURCE.read_bytes() + _INCLUDED.read_bytes()).hexdigest()
+_INCLUDED = [_SOURCE.with_name(name) for name in ("lent.pxi", "searched.pxi")]
+_FINGERPRINT = hashlib.sha256(b"".join(each.read_bytes() for each in (_SOURCE, *_INCLUDED))).hexdigest()
 
 
 class _BuildWherePossible(build_ext):
@@ -44,7 +44,7 @@ setup(
         Extension(
             "syncrelay.ros.compiled.path",
             [str(_SOURCE)],
-            depends=[str(_INCLUDED)],
+            depends=[str(each) for each in _INCLUDED],
             define_macros=[("SYNCRELAY_SOURCE", f'"{_FINGERPRINT}"')],
             extra_compile_args=["-g0"],
             optional=True,

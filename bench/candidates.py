@@ -21,7 +21,7 @@ class Load:
     """Topics of a type, published at a rate, and the groups that use them.
 
     The topics of a set share a stamp and follow each other `apart_s`: by default so that each message wakes the
-    relay, as messages of real sensors do.
+    relay, as messages of real sensors do. With `own_stamps` each has its own, and sets are the nearest messages.
     """
 
     type_name: str
@@ -31,6 +31,7 @@ class Load:
     groups: int = 1
     shared: bool = False
     apart_s: float = 0.0002
+    own_stamps: bool = False
     environ: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -53,6 +54,8 @@ LOADS = {
     "2 x 200 Hz x 1 kB": Load("Image", 1_000, 200),
     "4 x 100 Hz Imu": Load("Imu", 0, 100, topics=4),
     "9 x 50 Hz Imu": Load("Imu", 0, 50, topics=9, apart_s=0),
+    "2 x 200 Hz x 1 kB, own stamps": Load("Image", 1_000, 200, own_stamps=True),
+    "4 x 100 Hz Imu, own stamps": Load("Imu", 0, 100, topics=4, own_stamps=True),
     "2 x 1 kHz x 1 kB": Load("Image", 1_000, 1_000),
     "10 x 2 x 20 Hz x 1 kB": Load("Image", 1_000, 20, groups=10),
     "2 x 20 Hz x 1 MB": Load("Image", 1_000_000, 20, environ=LARGE),
@@ -177,7 +180,7 @@ class Workshop:
 def _groups(load):
     return {
         f"g{group}": {
-            "policy": "approximate_time_eager",
+            "policy": "approximate_time" if load.own_stamps else "approximate_time_eager",
             "slop": "5ms",
             "topics": [
                 {"topic": topic, "type": f"sensor_msgs/msg/{load.type_name}", "output": output}

@@ -1,6 +1,6 @@
 """The publisher and the receiver around a relay under test, each a process that rounds.py starts.
 
-    rig.py publish TYPE --size BYTES --rate HZ --together N --apart SECONDS TOPIC...
+    rig.py publish TYPE --size BYTES --rate HZ --together N --apart SECONDS [--own-stamps] TOPIC...
     rig.py receive TYPE --together N [--bundled TYPE] [--hear MANIFEST] TOPIC...
 
 Both say `ready` when DDS has matched them, and then wait for turns on stdin. Stamps are times of publishing by the
@@ -50,6 +50,8 @@ def publish(node, asked):
             # One stamp, when the last of them is due: however busy the machine is, they are a set.
             payload = patch_stamp(payload, time.time_ns() + int((len(group) - 1) * asked.apart * 1e9))
             for publisher in group:
+                if asked.own_stamps:
+                    payload = patch_stamp(payload, time.time_ns())
                 publisher.publish(payload)
                 if asked.apart:
                     time.sleep(asked.apart)
@@ -113,6 +115,7 @@ def main():
     parser.add_argument("--rate", type=float)
     parser.add_argument("--together", type=int)
     parser.add_argument("--apart", type=float)
+    parser.add_argument("--own-stamps", action="store_true")
     parser.add_argument("--bundled")
     parser.add_argument("--hear", action="append", default=[])
     asked = parser.parse_args()

@@ -87,6 +87,7 @@ class Station:
         environ = {**load.environ, "ROS_DOMAIN_ID": str(domain)}
         rig = [sys.executable, str(HERE / "rig.py")]
         pace = [f"--size={load.size}", f"--rate={load.rate}", f"--apart={load.apart_s}", f"--together={load.topics}"]
+        pace += ["--own-stamps"] if load.own_stamps else []
         hear = [f"--hear={topic}" for topic in candidate.hear]
         relay_environ = {**environ, **candidate.environ}
         self.relay = start(candidate.argv, relay_environ, candidate.folder)

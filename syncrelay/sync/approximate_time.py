@@ -3,6 +3,7 @@
 from bisect import bisect_left, bisect_right, insort
 from collections.abc import Sequence
 
+from syncrelay.sync.lending import LARGEST_NS, MOST_LENT, Search, SearchTerms
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
 from syncrelay.sync.policy import Queued, limit_of, of_required
@@ -95,11 +96,6 @@ class ApproximateTime(Queued):
         self.waits_started = 0
         self._reset()
 
-    @property
-    def at_once(self) -> int:
-        # No set is better than one of equal stamps.
-        return 0
-
     def for_required(self, required: Sequence[bool], quorum: int) -> tuple["ApproximateTime", OptionalInputs]:
         policy = ApproximateTime(
             n_inputs=sum(required),
@@ -160,6 +156,38 @@ class ApproximateTime(Queued):
                 heads.append((stamps[0], place))
         heads.sort()
         self._heads = heads
+
+    @property
+    def search_terms(self) -> SearchTerms | None:
+        terms = SearchTerms(self._queue_size, self._slop, self._scale, self._min_periods)
+        numbers = (*self._scale, *self._min_periods)
+        fits = not self._are_narrowed and self.n_inputs * self._queue_size <= MOST_LENT and max(numbers) < LARGEST_NS
+        return terms if fits else None
+
+    def lend(self, newest: Sequence[int]) -> Search | None:
+        firsts = [stamps[0] if stamps else after for stamps, after in zip(self._stamps, newest, strict=True)]
+        # What queues lost tells nothing of messages that come much later.
+        if self._overflowed or self._losses.reach(min(firsts) - self._slop) or max(firsts) >= LARGEST_NS:
+            return None
+        candidate = None
+        if self._pivot is not None:
+            ends = self._candidate_start, self._candidate_end, self._proof_end
+            candidate = (self._pivot, self._pivot_stamp, *ends)
+        return Search(self._messages, self._cursors, newest, candidate)
+
+    def take_back(self, search: Search) -> None:
+        for queue, messages in zip(self._queues, search.queues, strict=True):
+            queue.messages[:] = messages
+            queue.stamps[:] = [message.stamp for message in messages]
+        self._forget_candidate()
+        self._cursors = list(search.cursors)
+        rows = zip(self._stamps, search.cursors, strict=True)
+        self._heads = sorted((stamps[at], place) for place, (stamps, at) in enumerate(rows) if at < len(stamps))
+        self.waits_ended = self.waits_started
+        if search.candidate is not None:
+            self._pivot, self._pivot_stamp, *ends = search.candidate
+            self._candidate_start, self._candidate_end, self._proof_end = ends
+            self.waits_started += 1
 
     def _feed_behind(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
         stamps = self._stamps[place]

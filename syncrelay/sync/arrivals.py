@@ -47,6 +47,11 @@ class Arrivals:
         """Note the stamps of a set that is newer than all that came before."""
         self.newest[:] = self._given[:] = stamps
 
+    def note_lent(self, newest: Sequence[int], given: Sequence[int]) -> None:
+        """Note the newest stamps that came, and that went into sets, while the engine lent its search."""
+        self.newest[:] = newest
+        self._given[:] = map(max, self._given, given)
+
     def is_late(self, index: int, stamp: int, *, or_equal: bool) -> bool:
         """Whether a set with this stamp would be older than one that left. `or_equal`: equal stamps are late, too."""
         given = self._given[index]

@@ -4,6 +4,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from syncrelay.sync.lending import Fed
 from syncrelay.sync.messages import DropReason, Match, Outcome
 
 
@@ -49,6 +50,14 @@ class Ledger:
                         self._absent[index] += message is None
             else:
                 self._dropped[outcome.message.input][outcome.reason] += 1
+
+    def note_lent(self, sets: int, inputs: Sequence[Fed]) -> None:
+        """Count what came and left while the engine lent its search."""
+        self.sets += sets
+        for index, each in enumerate(inputs):
+            self.fed[index] += each.messages
+            for reason, count in each.dropped.items():
+                self._dropped[index][reason] += count
 
     def note_sets(self, sets: int) -> None:
         """Count so many sets, of a new message of each input."""

@@ -5,6 +5,7 @@ from typing import Generic
 
 from syncrelay.sync.arrivals import Arrivals
 from syncrelay.sync.counts import InputCounts, Ledger
+from syncrelay.sync.lending import Fed, Search, SearchTerms
 from syncrelay.sync.matching import Limited, Prompt
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome, Restamp, T, common_stamp
 from syncrelay.sync.policy import Policy
@@ -38,6 +39,7 @@ class SyncGroup(Generic[T]):
         "_by_stamp",
         "_feed",
         "_is_limited",
+        "_is_plain",
         "_ledger",
         "_matching",
         "_newest",
@@ -115,6 +117,7 @@ class SyncGroup(Generic[T]):
         self._feed = self._matching.feed
         is_plain = all(required) and not any(offsets) and not self._is_limited
         is_plain &= self._thinning is None and restamp is None
+        self._is_plain = is_plain
         self.at_once = policy.at_once if is_plain else None
         """How far apart the stamps of what `lend` lets another match may be; None where it always returns None."""
 
@@ -160,6 +163,28 @@ class SyncGroup(Generic[T]):
             return
         self._ledger.note_sets(sets)
         self._arrivals.note_set(newest)
+
+    @property
+    def search_terms(self) -> SearchTerms | None:
+        """What the search goes by that `lend_search` lends; None where it always returns None."""
+        return self._matching.search_terms if self._is_plain and isinstance(self._matching, Prompt) else None
+
+    def lend_search(self) -> Search | None:
+        """Let another search, until `take_back_search`; None where what queues lost has a part in it.
+
+        It may take messages that are newer than what came of their input before, below LARGEST_NS, while there is room
+        in the queue. Whatever else comes is for the engine, once it has its search back.
+        """
+        if self.search_terms is None or not isinstance(self._matching, Prompt):
+            return None
+        return self._matching.lend(self._newest)
+
+    def take_back_search(self, search: Search, sets: int, inputs: Sequence[Fed]) -> None:
+        """Go on where another has left the search, after so many sets and after what came of each input."""
+        if isinstance(self._matching, Prompt):
+            self._matching.take_back(search)
+        self._ledger.note_lent(sets, inputs)
+        self._arrivals.note_lent(search.newest, [each.given for each in inputs])
 
     def reject(self, message: Message[T], reason: DropReason) -> Drop[T]:
         """Count a message that cannot be fed: it has no readable stamp."""

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from syncrelay.sync.arrivals import Arrivals
+from syncrelay.sync.lending import Search, SearchTerms
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.policy import Policy
 from syncrelay.sync.waiting import Waiting
@@ -30,6 +31,16 @@ class Prompt:
     @property
     def is_new(self) -> bool:
         return self._policy.is_new
+
+    @property
+    def search_terms(self) -> SearchTerms | None:
+        return self._policy.search_terms
+
+    def lend(self, newest: Sequence[int]) -> Search | None:
+        return self._policy.lend(newest)
+
+    def take_back(self, search: Search) -> None:
+        self._policy.take_back(search)
 
     def due(self, now: int) -> Sequence[Outcome]:
         return self._policy.advance(now - self._max_wait)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Final, Protocol
 
+from syncrelay.sync.lending import Search, SearchTerms
 from syncrelay.sync.messages import Drop, DropReason, Message, Outcome
 from syncrelay.sync.queues import Losses, StampQueue
 from syncrelay.sync.waiting import OptionalStage
@@ -49,6 +50,21 @@ class Policy(Protocol):
     def is_new(self) -> bool:
         """Whether nothing is buffered, and nothing remembered that what is fed is matched by."""
         return False
+
+    @property
+    def search_terms(self) -> SearchTerms | None:
+        """What its search goes by, where that can be lent; None where it cannot."""
+        return None
+
+    def lend(self, newest: Sequence[int]) -> Search | None:
+        """Let another go on with the search, given the newest stamp of each input; None where it cannot now."""
+        del newest
+        return None
+
+    def take_back(self, search: Search) -> None:
+        """Go on where another has left the search."""
+        del search
+        raise AssertionError("this policy lends no search")
 
     def for_required(self, required: Sequence[bool], quorum: int) -> tuple["Policy", OptionalStage]:
         """Return a new policy of the same options for a group in which only some inputs are required.

@@ -83,6 +83,10 @@ class Losses:
         """Forget the lost messages, but keep what was needed."""
         self._lost = [[] for _ in self._lost]
 
+    def reach(self, since: int) -> bool:
+        """Whether a lost message is of this stamp or newer."""
+        return any(lost and lost[-1] >= since for lost in self._lost)
+
     def lose(self, place: int, stamp: int) -> None:
         """Note that the queue of `place` dropped its oldest message, of this stamp."""
         lost = self._lost[place]

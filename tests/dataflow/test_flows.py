@@ -13,8 +13,10 @@ from syncrelay.dataflow.flow import RECENT
 from syncrelay.explain import Tape
 from syncrelay.sync import DropReason, Message, SyncGroup
 from tests.dataflow.payloads import FLOWS, Named, Outlet, group_of
+from tests.faults.extent import chosen
 from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.streams import BEGIN, MS
+from tests.sync.support.rates import Rates
 from tests.sync.support.rigs import POLICIES, Step, make_group, options, plain_options, steps
 from tests.sync.test_vectors import CASES, SHIFT_NS
 from tests.sync.test_vectors import make_policy as policy_of
@@ -163,6 +165,29 @@ def test_the_same_leaves_of_any_engine(policy, data):
     assert first == second
 
 
+@pytest.mark.parametrize("seed", range(chosen(short=60, long=20_000)))
+def test_the_same_leaves_of_streams_of_any_rates(seed):
+    first, second = (_at_rates(flow, Rates(seed)) for flow in FLOWS)
+    assert first == second
+
+
+def _at_rates(flow, rates):
+    """All that can be seen of approximate_time at a draw's rates, by somebody who looks now and then."""
+    group = group_of(topics=[f"/input{index}" for index in range(rates.n_inputs)], now=lambda: 0, flow=flow)
+    group.engine = SyncGroup(rates.policy())
+    seen: list[object] = []
+    looks = rates.looks(10)
+    for index in range(rates.n_inputs):
+        group.connect(index, Outlet(log=seen, place=index), restamped=False)
+    for number, (index, stamp) in enumerate(rates.messages):
+        group.flow.receive(index, Named(number, number), stamp)
+        seen += [group.counts(), group.flow.n_sets] if number in looks else []
+    watched = group.flow.watched()
+    sets = [stamps for stamps, _ in watched.sets]
+    held = group.engine.flush(DropReason.SHUTDOWN)
+    return seen, list(group.flow.last), [*map(list, watched.arrivals)], sets, group.counts(), held, group.failure
+
+
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case["name"])
 def test_the_same_leaves_in_the_peers_own_cases(case):
     taken = [
@@ -190,6 +215,13 @@ def _left(flow, engine, taken, *, n_inputs):
             group.flow.receive(step.message.input, payload, step.message.stamp, step.message.key)
         seen.append(group.flow.n_sets)
     return seen, list(group.flow.last), group.counts(), group.failure
+
+
+def test_sets_of_messages_that_are_near_each_other_need_no_engine(monkeypatch):
+    played = _Played(FLOWS[-1], _AT_ONCE[1], {0, 1, 2})
+    monkeypatch.setattr(SyncGroup, "add", None)
+    _, last, *_ = played.play([[(index, index, False) for index in range(3)]] * 400)
+    assert (len(last), played.n_sets) == (RECENT, 399)
 
 
 @pytest.mark.parametrize("keys", _AT_ONCE)

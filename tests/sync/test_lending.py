@@ -1,5 +1,6 @@
-"""What `lend` promises: while an engine lends, a few lines that know no policy give what it would."""
+"""What `lend` and `lend_search` promise: while an engine lends, another gives what it would."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -7,6 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.sync import DropReason, ExactTime, Match, Message, SyncGroup
+from syncrelay.sync.arrivals import JUMP_NS
+from syncrelay.sync.lending import Fed
+from tests.faults.extent import chosen
+from tests.sync.support.rates import Rates
 from tests.sync.support.rigs import POLICIES, make_group, options, plain_options, steps
 
 
@@ -72,6 +77,30 @@ def test_the_same_leaves_of_an_engine_that_lends(policy, rig, looked_at):
             assert lending.counts() == plain.counts()
     assert borrower.end(now=0) == []
     assert (lending.counts(), lending.sets) == (plain.counts(), plain.sets)
+    assert lending.flush(DropReason.SHUTDOWN) == plain.flush(DropReason.SHUTDOWN)
+
+
+@pytest.mark.parametrize("seed", range(chosen(short=60, long=20_000)))
+def test_a_search_goes_on_in_another_engine_as_it_would_have(seed):
+    rates = Rates(seed)
+    plain, lending = SyncGroup(rates.policy()), SyncGroup(rates.policy())
+    newest, given, lent_after = [0] * rates.n_inputs, [-(2**63)] * rates.n_inputs, rates.looks(60)
+    for number, (index, stamp) in enumerate(rates.messages):
+        left = [*plain.add(Message(index, stamp, number), now=0)]
+        assert [*lending.add(Message(index, stamp, number), now=0)] == left
+        # After a jump back, an engine remembers more than its search.
+        lent_after = set() if stamp < newest[index] - JUMP_NS else lent_after
+        newest[index] = max(newest[index], stamp)
+        for each in left:
+            if isinstance(each, Match):
+                given = [max(stamp or 0, before) for stamp, before in zip(each.stamps, given, strict=True)]
+        search = lending.lend_search() if number in lent_after else None
+        if search is not None:
+            counts, lending = lending.counts(), SyncGroup(rates.policy())
+            fed = [Fed(each.fed, each.dropped, given[at]) for at, each in enumerate(counts)]
+            lending.take_back_search(search, plain.sets, fed)
+    counted = [replace(each, needed_queue=None) for each in plain.counts()]
+    assert [replace(each, needed_queue=None) for each in lending.counts()] == counted
     assert lending.flush(DropReason.SHUTDOWN) == plain.flush(DropReason.SHUTDOWN)
 
 

@@ -17,6 +17,7 @@ from syncrelay.dataflow.deliveries import GID_BYTES, LARGEST_GAP, MOST_PUBLISHER
 from syncrelay.dataflow.flow import RECENT, Watched
 from syncrelay.explain import RecentDrop
 from syncrelay.sync import DropReason, Match, Message, SyncGroup
+from syncrelay.sync.lending import LARGEST_NS, MOST_LENT, Fed, Search
 
 cimport cython
 from cpython.memoryview cimport PyMemoryView_FromMemory
@@ -820,7 +821,8 @@ cdef class Deliver:
         return 0
 
 
-include "at_once.pxi"
+include "lent.pxi"
+include "searched.pxi"
 
 cdef enum:
     # So many sets leave before an engine is asked again that had to match itself.
@@ -828,7 +830,7 @@ cdef enum:
 
 
 cdef class Flow:
-    """As dataflow.flow.Flow, and forms the sets that leave at once itself while nobody wants more of them."""
+    """As dataflow.flow.Flow, and forms sets itself while an engine lends and nobody wants more of them."""
 
     cdef public object manifests, bundle
     cdef public list outlets, restamped, keys
@@ -837,12 +839,10 @@ cdef class Flow:
     cdef object _engine, _config, _now, _refusals, _tape, _last, _watched, _note_left, _note_set
     cdef list _note_arrival
     cdef Lent _lent
-    cdef bint _may_lend
     cdef int _sets_until_asked
 
     def __init__(self, config, *, now, refusals, tape):
         n_inputs = len(config.topics)
-        self._lent = Lent(n_inputs)
         self.manifests, self.bundle, self.n_sets = None, None, 0
         self._config, self._tape = config, tape
         self._refusals, self.unpublished = refusals, refusals.unpublished
@@ -855,15 +855,19 @@ cdef class Flow:
 
     @property
     def engine(self):
-        self._take_back(1 if self._lent.n_held else 0)
+        if self._lent is not None:
+            self._take_back(self._lent.sets_until_asked())
         return self._engine
 
     @engine.setter
     def engine(self, engine):
-        if self._engine is not None:
-            self._take_back(0)
-        self._engine, self._sets_until_asked = engine, 0
-        self._may_lend = isinstance(engine, SyncGroup) and engine.at_once is not None
+        self._take_back(0)
+        self._engine, self._lent, self._sets_until_asked = engine, None, 0
+        if isinstance(engine, SyncGroup):
+            if engine.at_once is not None:
+                self._lent = AtOnce(len(self.outlets), engine.at_once)
+            elif engine.search_terms is not None:
+                self._lent = Searched(len(self.outlets), engine.search_terms)
 
     @property
     def last(self):
@@ -900,79 +904,86 @@ cdef class Flow:
     cdef int take(self, Py_ssize_t index, object payload, int64_t stamp, int64_t received) except -1:
         """Take in a message that has no key and no frame."""
         cdef Lent lent = self._lent
-        if not lent.is_lent and (not self._may_lend or self._sets_until_asked or not self._borrow()):
+        if lent is None or (not lent.is_lent and (self._sets_until_asked or not self._borrow())):
             return self.feed(index, payload, stamp, None, None)
-        if not lent.fits(index, stamp) or (lent.n_held + 1 == lent.n_inputs and self._is_told_of()):
+        if not lent.fits(index, stamp) or (lent.may_leave(index) and self._is_told_of()):
             return self.feed(index, payload, stamp, None, None)
-        if lent.n_rows >= ROWS:
+        if lent.is_full():
             self._tell()
-        if lent.hold(index, payload, stamp, received):
-            self._leave()
+        cdef Py_ssize_t n_left = lent.n_left
+        lent.take(index, payload, stamp, received)
+        if lent.whole:
+            self._leave(n_left)
         return 0
 
     cdef bint _borrow(self) except -1:
         """Ask the engine to lend; whether it does."""
-        newest = None if self._is_told_of() else self._engine.lend()
-        if newest is None:
-            self._sets_until_asked = SETS_UNTIL_ASKED
-            return False
-        self._lent.begin(self._engine.at_once, newest)
-        return True
+        if not self._is_told_of() and self._lent.begin(self._engine):
+            return True
+        self._sets_until_asked = SETS_UNTIL_ASKED
+        return False
 
     cdef bint _is_told_of(self) except -1:
         """Whether more is to be done of a set than to publish its messages."""
         return self._tape.is_on or (self.manifests is not None and self.manifests.is_heard)
 
-    cdef int _leave(self) except -1:
-        """Publish the set that is whole."""
+    cdef int _leave(self, Py_ssize_t at) except -1:
+        """Publish the sets among what left, from there on."""
         cdef Lent lent = self._lent
-        cdef int64_t received = lent.close()
-        cdef Row * last = &lent.rows[lent.n_rows - 1]
-        cdef Py_ssize_t index
-        if self.bundle is not None:
-            messages = [Message(index, lent.newest[index], lent.payloads[index]) for index in range(lent.n_inputs)]
-            self.bundle.send(Match(tuple(messages)), self.n_sets + 1)
-            del messages
-        for index in range(lent.n_inputs):
-            payload = lent.payloads[index]
-            lent.payloads[index] = None
-            self._publish(index, payload, None)
-        last.latency = sr_clock(CLOCK_REALTIME) - received
-        self.n_sets += 1
+        cdef Left * last
+        cdef Py_ssize_t index, n = 0
+        payloads, lent.whole = lent.whole, []
+        while at < lent.n_left:
+            if lent.left[at].way != WHOLE:
+                at += 1
+                continue
+            if self.bundle is not None:
+                messages = [
+                    Message(index, lent.left[at + index].stamp, payloads[n + index]) for index in range(lent.n_inputs)
+                ]
+                self.bundle.send(Match(tuple(messages)), self.n_sets + 1)
+                del messages
+            for index in range(lent.n_inputs):
+                payload, payloads[n] = payloads[n], None
+                self._publish(index, payload, None)
+                n += 1
+            at += lent.n_inputs
+            last = &lent.left[at - 1]
+            last.way, last.time = SENT, sr_clock(CLOCK_REALTIME) - last.time
+            self.n_sets += 1
         return 0
 
     cdef int _tell(self) except -1:
         """Have objects of Python tell of what came and left while the engine lent."""
         cdef Lent lent = self._lent
-        cdef Py_ssize_t n, first
-        cdef Row * row
-        for n in range(lent.n_told, lent.n_rows):
-            row = &lent.rows[n]
-            self._note_arrival[row.index]((row.stamp, row.received))
-        for first in range(0, lent.n_rows - lent.n_held, lent.n_inputs):
-            row = &lent.rows[first]
-            if row[lent.n_inputs - 1].latency == NOT_LEFT:
+        cdef Py_ssize_t at = 0, n
+        cdef Left * last
+        if lent is None:
+            return 0
+        for n in range(lent.n_came):
+            self._note_arrival[lent.came[n].index]((lent.came[n].stamp, lent.came[n].received))
+        while at < lent.n_left:
+            last = &lent.left[at]
+            if last.way in (SUPERSEDED, TOO_FAR):
+                self._note_left(RecentDrop(last.index, last.stamp, _REASONS[last.way]))
+                at += 1
                 continue
-            stamps = [None] * lent.n_inputs
-            for n in range(lent.n_inputs):
-                stamps[row[n].index] = row[n].stamp
-            told = tuple(stamps)
-            self._note_set((told, row[lent.n_inputs - 1].latency))
-            self._note_left(told)
-        lent.forget()
+            told = tuple([lent.left[n].stamp for n in range(at, at + lent.n_inputs)])
+            at += lent.n_inputs
+            last = &lent.left[at - 1]
+            # What could not be published has stopped the group.
+            if last.way == SENT:
+                self._note_set((told, last.time))
+                self._note_left(told)
+        lent.n_came = lent.n_left = 0
         return 0
 
     cdef int _take_back(self, int sets_until_asked) except -1:
         """Have the engine match, and ask it again after so many sets."""
-        cdef Lent lent = self._lent
-        if not lent.is_lent:
-            return 0
-        self._sets_until_asked = sets_until_asked
-        self._tell()
-        held, n_sets = lent.held(), lent.n_sets
-        self._engine.take_back(n_sets, lent.end())
-        for message in held:
-            self._engine.add(message, now=0)
+        if self._lent is not None and self._lent.is_lent:
+            self._sets_until_asked = sets_until_asked
+            self._tell()
+            self._lent.end(self._engine)
         return 0
 
     cdef int reject(self, Py_ssize_t index, object payload) except -1:
