@@ -22,7 +22,7 @@ class Endpoint:
     gid: bytes = field(default=b"", compare=False, repr=False)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # frozen, it would cost three times as much to make, at each look
 class Sender:
     """A node that publishes an input, and how many of its messages came lately, by the numbers that they have.
 
@@ -89,7 +89,7 @@ class Refusal:
         return f"this process has it as {self.held_as} already" if self.held_as else self.why
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # frozen, it would cost three times as much to make, at each look
 class InputGraph:
     """What the graph shows around an input; a recording shows no more than that it was published.
 

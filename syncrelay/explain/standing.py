@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from typing import Final, NamedTuple, TypeAlias
 
@@ -53,8 +52,7 @@ class Standing(Enum):
     NONE = "none"
 
 
-@dataclass(frozen=True, slots=True)
-class Share:
+class Share(NamedTuple):
     """The sets that left, and those that were possible, in the last `ns` nanoseconds.
 
     The needed input with the fewest messages, received or expected, limits what is `possible`. It is the `pacemaker`;

@@ -1,7 +1,6 @@
 """A group of the file under observation: what came and left, and from it, at any moment, the facts."""
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import replace
 from typing import Unpack
 
 from syncrelay.clock import Step
@@ -154,7 +153,8 @@ class GroupWatch:
             return facts
         # A group whose publishers have just come has not missed a set yet.
         is_silent = facts.is_silent and not facts.is_new
-        return replace(facts, standing=self._standing.follow(figures.share, is_silent=is_silent))
+        facts.standing = self._standing.follow(figures.share, is_silent=is_silent)
+        return facts
 
     def _follow_pauses(self, now: int, *, is_paused: bool) -> None:
         if self._was_paused and not is_paused:
