@@ -13,6 +13,7 @@ from syncrelay.explain.suggester import Suggester
 from syncrelay.explain.unneeded import DropFates, drop_fates, may_set_pace
 from syncrelay.sync import Lapse
 from syncrelay.sync.counts import InputCounts
+from syncrelay.sync.messages import DropReason
 
 _SECOND: Final = 1_000_000_000
 _NO_SETS: Final = 5 * _SECOND
@@ -21,6 +22,7 @@ NO_SECOND: Final = 10 * _SECOND
 # No set for this long, and for so many that should have come, may have a cause that is known already.
 _STOPPED: Final = _SECOND
 _STOPPED_SETS: Final = 5
+_OF_NO_USE: Final = frozenset({DropReason.MALFORMED, DropReason.UNSTAMPED})
 # What is found within this time of a group's beginning was there before.
 _FOUND_AT_ONCE: Final = 2 * _SECOND
 
@@ -57,6 +59,36 @@ class InputFacts:
     def output(self) -> str:
         """The topic on which its messages leave."""
         return self.graph.output
+
+    def is_served(self) -> bool:
+        """Whether it has publishers that all fit, and nothing keeps the relay from using it."""
+        graph = self.graph
+        return (
+            bool(graph.publishers)
+            and graph.refusal is None
+            and not graph.not_importable
+            and not graph.not_readable
+            and all(each.type == self.type and each.mismatch is None for each in graph.publishers)
+        )
+
+    def comes_in_order(self) -> bool:
+        """Whether its messages come whole, on time and in order, at its usual pace, as far as is known."""
+        figures = self.figures
+        return not (
+            figures.duplicates
+            or figures.out_of_order
+            or figures.bursts
+            or figures.swings
+            or figures.slowed_from_hz is not None
+            or figures.fell_at is not None
+            or self.graph.lost
+            or any(each.lost for each in self.graph.senders)
+            or not figures.dropped.keys().isdisjoint(_OF_NO_USE)
+        )
+
+    def is_ours_alone(self) -> bool:
+        """Whether nobody else publishes its output, and all that subscribe to it get it."""
+        return not self.graph.rivals and all(each.mismatch is None for each in self.graph.subscribers)
 
 
 class Standstill(NamedTuple):

@@ -52,10 +52,11 @@ Found: TypeAlias = Iterator[Fault]
 
 
 class Rule(NamedTuple):
-    """How faults of one code are found."""
+    """How faults of one code are found: none where all inputs are as `unless_all` says, which costs less to see."""
 
     code: Code
     find: Callable[[GroupFacts], Iterable[Fault]]
+    unless_all: Callable[[InputFacts], bool] | None = None
 
     def findings(self, facts: GroupFacts) -> list[Finding]:
         """Return what it finds."""
@@ -65,7 +66,23 @@ class Rule(NamedTuple):
         ]
 
 
-def of_each_input(code: Code, rule: Callable[[GroupFacts, int, InputFacts], Found]) -> Rule:
+def found_by(rules: Iterable[Rule], facts: GroupFacts) -> Iterator[Finding]:
+    """Yield what rules find, of which only those are asked that may find something."""
+    are_all: dict[Callable[[InputFacts], bool], bool] = {}
+    for rule in rules:
+        if (unless_all := rule.unless_all) is not None:
+            if unless_all not in are_all:
+                are_all[unless_all] = all(map(unless_all, facts.inputs))
+            if are_all[unless_all]:
+                continue
+        yield from rule.findings(facts)
+
+
+def of_each_input(
+    code: Code,
+    rule: Callable[[GroupFacts, int, InputFacts], Found],
+    unless_all: Callable[[InputFacts], bool] | None = None,
+) -> Rule:
     """Make a rule about an input one about a group, the required inputs first."""
 
     def find(facts: GroupFacts) -> list[Fault]:
@@ -74,7 +91,7 @@ def of_each_input(code: Code, rule: Callable[[GroupFacts, int, InputFacts], Foun
             fault._replace(input=index) for index in facts.required_first for fault in rule(facts, index, inputs[index])
         ]
 
-    return Rule(code, find)
+    return Rule(code, find, unless_all)
 
 
 def blocks(facts: GroupFacts, an_input: InputFacts) -> Severity:

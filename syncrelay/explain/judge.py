@@ -47,8 +47,8 @@ from syncrelay.explain.causes import (
     set_at,
 )
 from syncrelay.explain.codes import MATCHING, Code, Of, Severity
-from syncrelay.explain.facts import GroupFacts
-from syncrelay.explain.findings import Finding, Rule, of_each_input
+from syncrelay.explain.facts import GroupFacts, InputFacts
+from syncrelay.explain.findings import Finding, Rule, found_by, of_each_input
 from syncrelay.explain.known_soon import known_soon
 from syncrelay.explain.order import WINDOW_NS
 from syncrelay.explain.standing import BACK, FEW, Standing
@@ -57,32 +57,32 @@ _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     Rule(Code.INTERNAL_ERROR, rules_graph.internal_error),
     Rule(Code.INACTIVE, rules_graph.inactive),
     Rule(Code.PAUSED, rules_flow.paused),
-    of_each_input(Code.REFUSED_BY_DDS, rules_graph.refused_by_dds),
+    of_each_input(Code.REFUSED_BY_DDS, rules_graph.refused_by_dds, InputFacts.is_served),
     Rule(Code.NO_BUNDLE, rules_graph.no_bundle),
-    of_each_input(Code.TYPE_NOT_IMPORTABLE, rules_graph.type_not_importable),
-    of_each_input(Code.OTHER_TYPE, rules_graph.other_type),
-    of_each_input(Code.SEVERAL_TYPES, rules_graph.several_types),
+    of_each_input(Code.TYPE_NOT_IMPORTABLE, rules_graph.type_not_importable, InputFacts.is_served),
+    of_each_input(Code.OTHER_TYPE, rules_graph.other_type, InputFacts.is_served),
+    of_each_input(Code.SEVERAL_TYPES, rules_graph.several_types, InputFacts.is_served),
     Rule(Code.ALONE, rules_graph.alone),
-    Rule(Code.NO_PUBLISHER, rules_graph.no_publisher),
-    of_each_input(Code.INCOMPATIBLE_QOS, rules_graph.incompatible_qos),
+    Rule(Code.NO_PUBLISHER, rules_graph.no_publisher, InputFacts.is_served),
+    of_each_input(Code.INCOMPATIBLE_QOS, rules_graph.incompatible_qos, InputFacts.is_served),
     Rule(Code.NOBODY_LISTENS, rules_outputs.nobody_listens),
     Rule(Code.NO_CLOCK, rules_graph.no_clock),
     Rule(Code.CLOCK_STOPPED, rules_graph.clock_stopped),
     Rule(Code.TOO_SLOW, rules_flow.too_slow),
     Rule(Code.SILENT, rules_graph.silent),
-    of_each_input(Code.MALFORMED, rules_stamps.malformed),
-    of_each_input(Code.UNSTAMPED, rules_stamps.unstamped),
-    of_each_input(Code.SEVERAL_PUBLISHERS, rules_stamps.several_publishers),
+    of_each_input(Code.MALFORMED, rules_stamps.malformed, InputFacts.comes_in_order),
+    of_each_input(Code.UNSTAMPED, rules_stamps.unstamped, InputFacts.comes_in_order),
+    of_each_input(Code.SEVERAL_PUBLISHERS, rules_stamps.several_publishers, InputFacts.comes_in_order),
     Rule(Code.CLOCK_STEP, rules_stamps.clock_step),
     Rule(Code.CLOCK_DRIFT, rules_drift.clock_drift),
     Rule(Code.OTHER_CLOCK, rules_stamps.other_clock),
     Rule(Code.OTHER_CLOCK, rules_clock.off_the_clock),
-    of_each_input(Code.SLOWED, rules_flow.slowed),
-    Rule(Code.BURSTS, rules_flow.bursts),
-    of_each_input(Code.TIME_JUMP, rules_stamps.time_jump),
-    of_each_input(Code.MESSAGES_LOST, rules_flow.messages_lost),
-    of_each_input(Code.OUT_OF_ORDER, rules_stamps.out_of_order),
-    of_each_input(Code.DUPLICATES, rules_stamps.duplicates),
+    of_each_input(Code.SLOWED, rules_flow.slowed, InputFacts.comes_in_order),
+    Rule(Code.BURSTS, rules_flow.bursts, InputFacts.comes_in_order),
+    of_each_input(Code.TIME_JUMP, rules_stamps.time_jump, InputFacts.comes_in_order),
+    of_each_input(Code.MESSAGES_LOST, rules_flow.messages_lost, InputFacts.comes_in_order),
+    of_each_input(Code.OUT_OF_ORDER, rules_stamps.out_of_order, InputFacts.comes_in_order),
+    of_each_input(Code.DUPLICATES, rules_stamps.duplicates, InputFacts.comes_in_order),
 )
 
 _MATCHING_RULES: Final[tuple[Rule, ...]] = (
@@ -97,9 +97,9 @@ _MATCHING_RULES: Final[tuple[Rule, ...]] = (
 """What they suggest they try, which costs: they are not asked for what a cause explains."""
 
 _OTHER_RULES: Final[tuple[Rule, ...]] = (
-    of_each_input(Code.SUBSCRIBER_QOS, rules_outputs.subscriber_qos),
+    of_each_input(Code.SUBSCRIBER_QOS, rules_outputs.subscriber_qos, InputFacts.is_ours_alone),
     Rule(Code.SUBSCRIBER_QOS, rules_outputs.bundle_subscriber_qos),
-    of_each_input(Code.OUTPUT_TAKEN, rules_outputs.output_taken),
+    of_each_input(Code.OUTPUT_TAKEN, rules_outputs.output_taken, InputFacts.is_ours_alone),
     Rule(Code.OUTPUT_TAKEN, rules_outputs.bundle_taken),
 )
 _FEW_SETS: Final = Rule(Code.FEW_SETS, rules_matching.few_sets)
@@ -116,7 +116,7 @@ class Judge:
     def judge(self, facts: GroupFacts) -> tuple[Finding, ...]:
         """Return what is not as usual, an error at least of a silent group; see `with_ok` for what is well."""
         # Of two publishers whose names are not known yet, the same may be said.
-        found = [*dict.fromkeys(finding for rule in _CAUSE_RULES for finding in rule.findings(facts))]
+        found = [*dict.fromkeys(found_by(_CAUSE_RULES, facts))]
         self._remember(found, facts)
         facts = self._since_the_last_cause(facts)
         self._missing_since = self._few_left_since(facts)
@@ -125,7 +125,7 @@ class Judge:
                 continue
             found += rule.findings(facts)
         found += self._still_too_wide(found, facts)
-        found += [finding for rule in _OTHER_RULES for finding in rule.findings(facts)]
+        found += found_by(_OTHER_RULES, facts)
         if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
             found += [_unexplained(facts)] if facts.had_time and not rules_matching.is_too_soon(facts) else []
         said = self._unexplained_by_others(found, facts) if found and self._causes else tuple(found)
