@@ -29,15 +29,20 @@ class Hull:
 
     def __init__(self, points: Sequence[Point], rate: float) -> None:
         """Take one point or more, and about how fast the delays grow."""
-        heights = sorted([y - rate * x for x, y, _ in points])
-        least = heights[_first_of_many(heights)]
+        heights = [y - rate * x for x, y, _ in points]
+        ordered = sorted(heights)
+        least = ordered[_first_of_many(ordered)]
         corners: list[tuple[float, float]] = []
         count, total_x, total_y = 0, 0.0, 0.0
-        for x, y, n in points:
-            if y - rate * x < least:
+        for (x, y, n), height in zip(points, heights, strict=True):
+            if height < least:
                 continue
             count, total_x, total_y = count + n, total_x + n * x, total_y + n * y
-            while len(corners) > 1 and _is_above(corners[-1], corners[-2], (x, y)):
+            while len(corners) > 1:
+                (x1, y1), (x2, y2) = corners[-2], corners[-1]
+                if (y2 - y1) * (x - x1) < (y - y1) * (x2 - x1):
+                    # It lies below the line between its neighbours.
+                    break
                 corners.pop()
             corners.append((x, y))
         self._corners, self._count = corners, count
@@ -97,9 +102,3 @@ def _spacing(heights: list[float], first: int) -> float:
     """Return how far apart the least heights are, from one of them on."""
     last = min(first + _NEAR, len(heights) - 1)
     return (heights[last] - heights[first]) / (last - first) if last > first else 0.0
-
-
-def _is_above(point: tuple[float, float], before: tuple[float, float], after: tuple[float, float]) -> bool:
-    """Whether a point lies above, or on, the line between two others."""
-    (x, y), (x1, y1), (x2, y2) = point, before, after
-    return (y - y1) * (x2 - x1) >= (y2 - y1) * (x - x1)

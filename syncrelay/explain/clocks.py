@@ -1,8 +1,7 @@
 """How fast a clock runs against the time of receipt, by the line under its delays."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from math import hypot
-from operator import itemgetter
 from statistics import median
 from typing import Final, NamedTuple, TypeVar
 
@@ -55,7 +54,7 @@ def drift(points: Sequence[tuple[int, int]]) -> Drift | None:
     if len(points) < _FEWEST or points[0][0] == points[-1][0]:
         return None
     watched = points[-1][0] - points[0][0]
-    points = [min(part, key=itemgetter(1)) for part in _parts([*points], _SHOWN)]
+    points = _least_of_parts([*points], [delay for _, delay in points], _SHOWN)
     # As differences of integers, before floats could lose the nanoseconds of an epoch.
     first_time, first_delay = points[0]
     near = [((time - first_time) / _SECOND, (delay - first_delay) / _SECOND, 1) for time, delay in points]
@@ -77,13 +76,14 @@ def drift(points: Sequence[tuple[int, int]]) -> Drift | None:
 
 def _joined(points: Sequence[Point], slope: float) -> Sequence[Point]:
     """Return of each few points the one that is nearest to a line below."""
-    return [min(part, key=lambda point: point[1] - slope * point[0]) for part in _parts(points, _JOINED)]
+    return _least_of_parts(points, [y - slope * x for x, y, _ in points], _JOINED)
 
 
-def _parts(points: Sequence[_T], most: int) -> Iterable[Sequence[_T]]:
-    """Divide points into no more parts than so many, of as many each."""
+def _least_of_parts(points: Sequence[_T], heights: Sequence[float], most: int) -> list[_T]:
+    """Divide points into no more parts than so many, of as many each, and return the lowest point of each."""
     of = -(-len(points) // most)
-    return (points[first : first + of] for first in range(0, len(points), of))
+    firsts = range(0, len(points), of)
+    return [points[heights.index(min(heights[first : first + of]), first)] for first in firsts]
 
 
 def _line(points: Sequence[Point], rate: float) -> tuple[float, list[float]]:
