@@ -138,11 +138,13 @@ class ShareWindow:
         self._paced: set[int] = set()
         self._has_clock = False
         self._have_all_come = False
+        self._share: Share | None = None
 
     def clear(self) -> None:
         """Start afresh: a clock was set, or nothing was fed for a while."""
         self._polls.clear()
         self._paced.clear()
+        self._share = None
 
     def add(
         self, counts: Sequence[InputCounts], sets: int, paces: Sequence[Pace], *, now: int, clock: int | None = None
@@ -166,14 +168,19 @@ class ShareWindow:
         self._is_pausing = [_is_pausing(pace, now) for pace in paces]
         self._is_steady = [pace.period is not None for pace in paces]
         self._polls.append(_Poll(now, now if clock is None else clock, sets, fed, owed, taken, gone, thinned))
+        self._share = None
         while len(self._polls) > 1 and (ns := now - self._polls[1].at) >= SHARE_WINDOW_NS:
-            if ns <= _LONGEST and self._since(self._polls[1]).possible < _ENOUGH_TO_TELL:
+            shorter = self._since(self._polls[1]) if ns <= _LONGEST else None
+            if shorter is not None and shorter.possible < _ENOUGH_TO_TELL:
                 break
             self._polls.popleft()
+            self._share = shorter
 
     def share(self) -> Share:
         """Return the share of the window."""
-        return self._since(self._polls[0]) if self._polls else NOT_KNOWN
+        if self._share is None:
+            self._share = self._since(self._polls[0]) if self._polls else NOT_KNOWN
+        return self._share
 
     def _have_come(self, paces: Sequence[Pace]) -> bool:
         have = [pace.first is not None for pace in paces]
