@@ -84,8 +84,8 @@ class CauseLog:
         self._found[facts.name] = facts, findings
         self._heard[facts.name] = now
         for each in facts.inputs:
-            if named := [publisher.node for publisher in each.graph.publishers if publisher.is_named]:
-                self.published_by[each.name] = " and ".join(sorted(set(named)))
+            if names := {publisher.node for publisher in each.graph.publishers if publisher.is_named}:
+                self.published_by[each.name] = " and ".join(sorted(names))
         for remark in remarks:
             self._wait([(facts.name, remark)], now)
 

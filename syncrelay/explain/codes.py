@@ -38,6 +38,9 @@ class Code(Enum):
     docs/generate/templates/findings.md.jinja.
     """
 
+    # As that of DropReason: Enum's own hash is Python code.
+    __hash__ = object.__hash__
+
     _value_: str
     of: Of
     severities: tuple[Severity, ...]

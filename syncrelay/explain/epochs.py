@@ -120,7 +120,11 @@ def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
     All are in nanoseconds, in the order of receipt.
     """
     newest = _newest(stamps, delays)
-    scatter = _scatter(delays[newest])
+    some = delays[newest]
+    if not some or max(some) - min(some) < _LEAST_SCATTER:
+        # As nearly always, and seen without sorting.
+        return None
+    scatter = _scatter(some)
     # Coarse stamps scatter by as much as they are rounded.
     if scatter < _LEAST_SCATTER or scatter < 2 * _unit(stamps[-_ENOUGH:]):
         return None
@@ -142,6 +146,9 @@ def resolution(stamps: Sequence[int], delays: Sequence[int]) -> int:
     0 too of a sensor that is as regular as that, whose stamps may have been rounded or not, and of one stamp alone.
     `delays` are the times of receipt minus the stamps.
     """
+    if not stamps or stamps[-1] % _RESOLUTIONS[-1]:
+        # As nearly always: the other units are multiples of this one.
+        return 0
     last, unit = stamps[-_ENOUGH:], _unit(stamps[-_ENOUGH:])
     if not unit or len(last) < _FEWEST:
         return 0

@@ -230,13 +230,13 @@ class InputObservation:
     ) -> InputFigures:
         """Give the figures; counts are those of the window, which is so many seconds long."""
         fell_by, fell_at = self._order.fell or (None, None)
-        rate_hz, usual_hz = self._rates(fed, seconds, now)
+        # Of what comes no more, nothing will be known soon.
+        goes_on = not self._is_silent_at(now)
+        rate_hz, usual_hz = self._rates(fed, seconds, now, goes_on=goes_on)
         faulty = self._order.lately(now)
         repeated = [each.at for each in faulty if each.duplicates]
         looks = [each.at for each in faulty if each.duplicates or each.falls]
         swings, swung_by = self._steps.swings(now)
-        # Of what comes no more, nothing will be known soon.
-        goes_on = not self._is_silent_at(now)
         may_step = self._steps.may_step and goes_on
         bursts = [each for each in self._bursts if each.at > now - WINDOW_NS]
         # Across a step they seem to run at any rate.
@@ -324,14 +324,14 @@ class InputObservation:
         pause, usual = now - times[-1], (times[-1] - times[0]) / max(1, len(times) - 1)
         return pause > _SILENT_NS and pause > _SILENT_PERIODS * usual
 
-    def _rates(self, fed: int, seconds: float, now: int) -> tuple[float, float]:
+    def _rates(self, fed: int, seconds: float, now: int, *, goes_on: bool) -> tuple[float, float]:
         """Give messages a second, of the window or of the last few where it held fewer, and while they came."""
         times = self._received
         if len(times) < 2 or times[-1] <= times[0]:  # noqa: PLR2004  two make a period
             return 0.0, 0.0
         mean = (len(times) - 1) * _SECOND / (times[-1] - times[0])
         usual = mean if len(times) >= _RATE_FROM else 0.0
-        if self._is_silent_at(now):
+        if not goes_on:
             return 0.0, usual
         if fed < _RATE_FROM or not seconds:
             return mean, usual

@@ -42,6 +42,7 @@ class Observation:
         self._began = began
         self._offsets = tuple(topic.offset_ns for topic in config.topics)
         self._config = config
+        self._has_choice = config.quorum > len(config.required)
         self._trigger = config.trigger
         self._ticks_hz = None if config.ticks is None else config.ticks.hz
         self.inputs = [InputObservation() for _ in config.topics]
@@ -166,7 +167,7 @@ class Observation:
 
     def _follow_needed(self, now: int) -> None:
         """With a quorum, inputs that come are needed, those in sets first. If too few come, the others all are."""
-        if self._config.quorum == len(self._config.required):
+        if not self._has_choice:
             return
         missing = self._missing(now)
         coming = [each.is_coming(now) for each in self.inputs]

@@ -47,14 +47,16 @@ class StampOrder:
 
     def lately(self, now: int) -> Sequence[Faults]:
         """Return what was wrong in the window, where something was."""
-        return [each for each in self._faults if each.at > now - WINDOW_NS and (each.duplicates or each.out_of_order)]
+        return [each for each in self._faults if each.at > now - WINDOW_NS]
 
     def add(self, stamps: Sequence[int], received: Sequence[int]) -> bool:
         """Take stamps and when they were received; whether one fell by more than a second."""
         before = self.fell
         while self._faults and self._faults[0].at <= received[-1] - WINDOW_NS:
             self._faults.popleft()
-        self._faults.append(self._judged(stamps, received))
+        faults = self._judged(stamps, received)
+        if faults.duplicates or faults.out_of_order:
+            self._faults.append(faults)
         return self.fell is not before
 
     def _judged(self, stamps: Sequence[int], received: Sequence[int]) -> Faults:

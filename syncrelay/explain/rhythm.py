@@ -125,10 +125,13 @@ class PaceWatch:
         self.may_be_slower = False
         """Whether the last few periods are alike, and so long that it has slowed down if they go on so."""
         self._paces: deque[float] = deque(maxlen=_PACES)
+        # Of these, or faster than all.
+        self._fastest = 0.0
 
     def forget(self) -> None:
         """Start afresh: others publish now."""
         self._paces.clear()
+        self._fastest = 0.0
         self.slowed_from = None
 
     def observe(self, times: Sequence[int], fresh: int) -> None:
@@ -161,13 +164,16 @@ class PaceWatch:
             if few[0] * self.now_hz * _SLOWED > _SECOND and len(_about(few[0], few)) == _FEW:
                 self.may_be_slower = self._fell_from(_pace_hz(few), few[0]) is not None
             self._paces.append(self.now_hz)
+            self._fastest = max(self._fastest, self.now_hz)
 
     def _fell_in(self, latest: Sequence[int]) -> float | None:
         return None if self.slowed_from else self._fell_from(_pace_hz(latest), sorted(latest)[1])
 
     def _fell_from(self, now_hz: float, short: int) -> float | None:
-        if not now_hz or len(self._paces) < _FEWEST_PACES or now_hz >= _SLOWED * max(self._paces):
+        if not now_hz or len(self._paces) < _FEWEST_PACES or now_hz >= _SLOWED * self._fastest:
+            # As nearly always, and seen without looking at all of them.
             return None
+        self._fastest = max(self._paces)
         usual = median(self._paces)
         odd = len(self._paces) // _ODD
         steady = sorted(self._paces)[odd : len(self._paces) - odd]

@@ -33,6 +33,7 @@ class GroupWatch:
         whole: Callable[[], Trials] | None = None,
     ) -> None:
         self.config = config
+        self._own_tolerances, self._narrowed = config.own_tolerances, config.narrowed
         self._ticks_hz = None if config.ticks is None else config.ticks.hz
         self._counts: tuple[InputCounts, ...] = config.engine().counts()
         self._keys: Sequence[Hashable] = (None,) * len(config.topics)
@@ -110,8 +111,8 @@ class GroupWatch:
             input_figures,
             self._keys,
             self._served_since,
-            self.config.own_tolerances,
-            self.config.narrowed,
+            self._own_tolerances,
+            self._narrowed,
             strict=True,
         )
         facts = GroupFacts(
