@@ -1,5 +1,6 @@
 """Findings about clocks that drift apart."""
 
+from collections.abc import Mapping
 from statistics import median_low
 from typing import Final
 
@@ -26,17 +27,20 @@ _EVIDENTLY: Final = 0.2
 _MATTERS: Final = 0.5
 
 
-def _drifts(facts: GroupFacts) -> tuple[dict[int, Drift], dict[int, Drift]]:
-    """Return the drifts of the inputs of which they are known, and how they drift away from the others' median."""
+def _drifts(facts: GroupFacts) -> dict[int, Drift]:
+    """Return the drifts of the inputs of which they are known, none where they are not known of two."""
     # What no crystal is off by is another rate.
     known = {
         index: each.figures.drift
         for index, each in enumerate(facts.inputs)
         if each.figures.drift and each.figures.reading is None
     }
-    if not facts.by_stamp or len(known) < 2:  # noqa: PLR2004  one alone cannot drift apart
-        return {}, {}
-    return known, {
+    return known if facts.by_stamp and len(known) > 1 else {}
+
+
+def _between(known: Mapping[int, Drift]) -> dict[int, Drift]:
+    """Return how inputs drift away from the others' median."""
+    return {
         index: apart(drift, median_low([known[other] for other in known if other != index]))
         for index, drift in known.items()
     }
@@ -65,15 +69,20 @@ def may_drift(facts: GroupFacts) -> bool:
         return True
     return any(
         abs(each.slope) >= max(needed, each.error) or (not is_urgent and abs(each.slope) + each.error >= needed)
-        for each in _drifts(facts)[1].values()
+        for each in _between(_drifts(facts)).values()
     )
 
 
 def clock_drift(facts: GroupFacts) -> Found:
     """Find the input whose stamps drift away from the others' median; of two that may be either, both."""
-    known, between = _drifts(facts)
+    known = _drifts(facts)
     if not known:
         return
+    slopes = [each.slope for each in known.values()]
+    if (max(slopes) - min(slopes)) * max([each.watched_ns for each in known.values()]) < _DRIFTED:
+        # As nearly always: none drifted farther from another.
+        return
+    between = _between(known)
     most = max(abs(each.slope) for each in between.values())
     # Of those that are as far from the others, the one whose stamps run least like this machine's clock.
     odd = max(
