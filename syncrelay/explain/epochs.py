@@ -153,6 +153,9 @@ def resolution(stamps: Sequence[int], delays: Sequence[int]) -> int:
     if not unit or len(last) < _FEWEST:
         return 0
     steps = list(map(sub, last[1:], last))
+    if steps[0] and _REGULAR * len(last) < steps.count(steps[0]) == len(steps):
+        # Nothing leapt.
+        return 0
     periods = Counter(steps)
     if periods[0]:
         # No sensor is so regular that it measures twice at a time.

@@ -52,7 +52,8 @@ class InputObservation:
         self._first: int | None = None
         self._flows_since: int | None = None
         self._pace = PaceWatch()
-        self._paced = no_values()
+        # So many of the last messages, and no others, are of who publishes now.
+        self._paced = 0
         self._nearest = no_values()
         self._delays = no_values()
         self._order = StampOrder()
@@ -91,19 +92,21 @@ class InputObservation:
         if stamped and stamped is not arrivals:
             stamps, received = zip(*stamped, strict=True)
         delays = list(map(sub, map(by_clock, received) if by_clock else received, stamps)) if stamped else []
+        least, most = (min(delays), max(delays)) if delays else (0, 0)
         if delays:
-            self._follow_steps(received, delays)
-        if begin := self._begin_anew(received, delays, has_fallen=fallen):
+            self._follow_steps(received, delays, least, most)
+        if begin := self._begin_anew(received, delays, least, most, has_fallen=fallen):
             stamped, stamps, delays = [*stamped][begin:], stamps[begin:], delays[begin:]
+            least, most = min(delays), max(delays)
         keep_last(self._received, all_received, _LAST_MESSAGES)
-        keep_last(self._paced, all_received, _LAST_MESSAGES)
+        self._paced += len(all_received)
         keep_last(self._stamps, stamps if delays else (), _TRIED_MESSAGES)
         keep_last(self._delays, delays, _TRIED_MESSAGES)
         # What is held up, and then comes at once, was sent at the pace of its stamps.
         # Where it does not run as time does, that is not known.
         self._observe_pace(self._stamps if delays and not self._is_misread else self._received, len(arrivals))
         if delays:
-            self._measure(stamped, delays, min(delays), max(delays))
+            self._measure(stamped, delays, least, most)
         return fallen
 
     def _follow_flow(self, received: Sequence[int]) -> None:
@@ -115,9 +118,9 @@ class InputObservation:
             self._flows_since = self.changed_at = received[0]
             self.forget_clock()
 
-    def _follow_steps(self, received: Sequence[int], delays: Sequence[int]) -> None:
+    def _follow_steps(self, received: Sequence[int], delays: Sequence[int], least: int, most: int) -> None:
         """Look whether the clock was set. What was stamped before tells nothing of it now."""
-        at = self._steps.add(received, delays, min(delays), max(delays), period=lambda: _median_period(self._received))
+        at = self._steps.add(received, delays, least, most, period=lambda: _median_period(self._received))
         if at is not None:
             step, now = self._steps.last, self._steps.least
             if step is not None and step.at == at and now is not None:
@@ -127,7 +130,9 @@ class InputObservation:
             self._forget_drift(until=at)
             self.changed_at = at
 
-    def _begin_anew(self, received: Sequence[int], delays: Sequence[int], *, has_fallen: bool) -> int:
+    def _begin_anew(
+        self, received: Sequence[int], delays: Sequence[int], least: int, most: int, *, has_fallen: bool
+    ) -> int:
         """Look whether stamps jumped by what is no delay, and if so forget the clock that they were of.
 
         Return the first of the new messages that are of the clock of now.
@@ -136,17 +141,17 @@ class InputObservation:
             return 0
         before = self._delays[-1] if self._delays else delays[0]
         # Stamps that do not run as time does may have come to do so.
-        least = JUMP_NS if has_fallen or self._is_misread else _FAR_NS
-        if max(before, *delays) - min(before, *delays) <= least:
+        near = JUMP_NS if has_fallen or self._is_misread else _FAR_NS
+        if max(before, most) - min(before, least) <= near:
             # As nearly always, and seen without looking at each.
             return 0
         by = _steps([*self._delays[-1:], *delays])
         # Of two clocks in turn, each fall is followed by a rise: nothing begins anew.
-        if max(map(abs, by), default=0) <= least or self._steps.swings(received[-1])[0]:
+        if max(map(abs, by), default=0) <= near or self._steps.swings(received[-1])[0]:
             return 0
         # Of seconds that are milliseconds, each is far from the one before it.
         usual = median(map(abs, [*_steps(self._delays[-_PERIODS:]), *by]))
-        far = [index for index, each in enumerate(by, len(delays) - len(by)) if abs(each) > max(least, _FAR * usual)]
+        far = [index for index, each in enumerate(by, len(delays) - len(by)) if abs(each) > max(near, _FAR * usual)]
         if has_fallen:
             self._delay_before = self._steps.least
             self._forget()
@@ -172,7 +177,7 @@ class InputObservation:
     def forget_publishers(self) -> None:
         """Bear that others publish now than did: their rate and their clocks are not those of before."""
         self._pace.forget()
-        del self._paced[:]
+        self._paced = 0
         self._forget_steps()
         self.forget_clock()
 
@@ -201,7 +206,8 @@ class InputObservation:
     def pace(self) -> Pace:
         """When the first and the last message came, and how steadily; without a last one where a clock jumped since."""
         last = self._received[-1] if self._received else None
-        return Pace(self._first, last, steady_period(self._paced) or self._steady_by_stamps())
+        of_now = self._received[-self._paced :] if self._paced else ()
+        return Pace(self._first, last, steady_period(of_now) or self._steady_by_stamps())
 
     def _steady_by_stamps(self) -> float | None:
         """Return the period of stamps that are steadier than their way here, and run as time does."""
@@ -286,8 +292,9 @@ class InputObservation:
 
     def _forget(self) -> None:
         """Start afresh: a clock jumped, that of the stamps or this machine's."""
-        for kept in (self._stamps, self._delays, self._received, self._paced, self._nearest):
+        for kept in (self._stamps, self._delays, self._received, self._nearest):
             del kept[:]
+        self._paced = 0
         self._bursts.clear()
         self._newest_arrivals.clear()
         self._newest_delays.clear()

@@ -1,8 +1,9 @@
 """Which messages are nearest to which, on arrays, whatever the slop and the queues."""
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import accumulate
+from operator import itemgetter
 from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
@@ -184,7 +185,9 @@ class NearestSpans:
     """
 
     def __init__(self, n_inputs: int, distance: Distance = Distance.SPAN) -> None:
-        self._measure = _age if distance is Distance.AGE else _tightest_span
+        is_age = distance is Distance.AGE
+        self._measure = _age if is_age else _tightest_span
+        self._measure_one: Callable[[tuple[int, int]], int] = itemgetter(0) if is_age else min
         self._stamps: list[list[int]] = [[] for _ in range(n_inputs)]
         self._measured_until: int | None = None
 
@@ -212,7 +215,11 @@ class NearestSpans:
         pivots = self._stamps[pivot]
         pivots = pivots[bisect_left(pivots, begin) : bisect_right(pivots, end)]
         others = [each for index, each in enumerate(self._stamps) if index != pivot]
-        spans = [self._measure([_side(each, stamp) for each in others]) for stamp in pivots]
+        if len(others) == 1:
+            # As of most groups, and without the list of its sides.
+            spans = [self._measure_one(_side(others[0], stamp)) for stamp in pivots]
+        else:
+            spans = [self._measure([_side(each, stamp) for each in others]) for stamp in pivots]
         self._measured_until = end
         for each in self._stamps:
             # One before the next stretch may be the nearest to its first message.
@@ -229,8 +236,6 @@ def _side(others: Sequence[int], stamp: int) -> tuple[int, int]:
 
 def _tightest_span(sides: list[tuple[int, int]]) -> int:
     """Return the span of the tightest set around a message, of how far on both sides of it each partner may be."""
-    if len(sides) == 1:
-        return min(sides[0])
     sides.sort()
     lefts = [0, *(before for before, _ in sides)]
     # Those up to a place lie before the message, and all others after it.

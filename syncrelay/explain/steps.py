@@ -61,17 +61,27 @@ class StampSteps:
         self._swung: Step | None = None
         self._swings: deque[Step] = deque(maxlen=100)
         self._least: deque[int] = deque(maxlen=_REMEMBERED)
+        self._nearest_to_none: int | None = None
         self.last: Step | None = None
         """The last step that stayed."""
 
     @property
     def least(self) -> int | None:
         """The least delay of the look at which it was nearest to none, in the last minute; None of a clock just set."""
-        return min(self._least, key=abs, default=None)
+        if self._nearest_to_none is None:
+            self._nearest_to_none = min(self._least, key=abs, default=None)
+        return self._nearest_to_none
+
+    def _remember(self, least: int) -> None:
+        known, oldest = self._nearest_to_none, self._least[0] if len(self._least) == _REMEMBERED else None
+        if known is not None and (abs(least) < abs(known) or oldest == known):
+            self._nearest_to_none = None
+        self._least.append(least)
 
     def forget_clock(self) -> None:
         """Bear that stamps are of another clock from now on."""
         self._least.clear()
+        self._nearest_to_none = None
 
     def forget(self) -> None:
         """Start afresh: this machine's clock was set."""
@@ -105,7 +115,7 @@ class StampSteps:
         if max(most, newest) - min(least, newest) >= STEP_NS:
             self._count_swings(_following(before, received, delays)[-len(delays) - 1 :], period())
         levels = self._levels
-        self._least.append(least)
+        self._remember(least)
         if len(levels) < _FEWEST:
             levels.append(least)
             return None
@@ -146,7 +156,7 @@ class StampSteps:
             self._off.clear()
             return None
         self._levels = deque(self._off, _LEVELS)
-        self._least = deque(self._off, _REMEMBERED)
+        self._least, self._nearest_to_none = deque(self._off, _REMEMBERED), None
         self._off.clear()
         if min(abs(level), abs(before)) < _LIVE and abs(by) < _DAY:
             self.last = Step(self._change.at, by)

@@ -33,6 +33,7 @@ class GroupWatch:
         whole: Callable[[], Trials] | None = None,
     ) -> None:
         self.config = config
+        self._tolerance = config.options.tolerance
         self._own_tolerances, self._narrowed = config.own_tolerances, config.narrowed
         self._ticks_hz = None if config.ticks is None else config.ticks.hz
         self._counts: tuple[InputCounts, ...] = config.engine().counts()
@@ -136,7 +137,7 @@ class GroupWatch:
                 for index, (topic, shown, type_name, counts, seen, key, since, own, narrowed) in enumerate(rows)
             ),
             figures=figures,
-            tolerance=options.tolerance,
+            tolerance=self._tolerance,
             by_stamp=options.by_stamp,
             distance=options.distance,
             repeats=options.repeats,
