@@ -102,6 +102,14 @@ def _faulty_since(facts: GroupFacts) -> int:
     return max((at for at in known if at is not None), default=facts.figures.now - WINDOW_NS)
 
 
+def _apart_since(facts: GroupFacts) -> int:
+    if facts.ticks_hz is None:
+        return facts.figures.nearest_from
+    # At ticks, what is too old is seen by how late messages come.
+    came = (each.figures.received[-len(each.figures.delays) :] for each in facts.inputs if each.figures.delays)
+    return min((received[0] for received in came if received), default=facts.figures.now)
+
+
 SEEN_SINCE: Final[Mapping[Code, Callable[[GroupFacts], int]]] = {
     # That an input is silent is seen of now alone.
     Code.SILENT: lambda facts: facts.figures.now,
@@ -110,7 +118,7 @@ SEEN_SINCE: Final[Mapping[Code, Callable[[GroupFacts], int]]] = {
     Code.NO_CLOCK: lambda facts: facts.figures.now,
     Code.OUT_OF_ORDER: _faulty_since,
     Code.DUPLICATES: _faulty_since,
-    Code.OVER_SLOP: lambda facts: facts.figures.nearest_from,
+    Code.OVER_SLOP: _apart_since,
     Code.CONSTANT_OFFSET: lambda facts: min(
         (each.figures.received[-rules_offset.ENOUGH :][0] for each in facts.inputs if each.figures.received),
         default=facts.figures.now,

@@ -94,7 +94,7 @@ def steady_period(times: Sequence[int]) -> float | None:
         return None
     near = _about(short, periods)
     base = sum(near) / len(near)
-    off = sorted(abs(each / base - round(each / base)) for each in periods if each <= _FAR * base)
+    off = sorted(abs(each / base - max(1, round(each / base))) for each in periods if each <= _FAR * base)
     most = ceil(_MOSTLY * len(periods))
     if most > len(off):
         return None

@@ -77,8 +77,9 @@ def _whole_periods_off(facts: GroupFacts, first: int, other: int) -> int | None:
     apart = distance + later
     whole = round(apart / period)
     delay = max((two.figures.delay or 0) - two.offset, (one.figures.delay or 0) - one.offset, key=abs)
-    # Results that take long have the stamps of what they are of. None is stamped before its time.
-    is_ahead = delay <= -_AHEAD * period
+    # Results that take long have the stamps of what they are of. None is stamped before its time, but a simulated clock
+    # comes in ticks, and is up to one behind.
+    is_ahead = facts.clock is None and delay <= -_AHEAD * period
     may_be_result = not is_ahead and abs(distance) < _OFF * period
     near = _WHOLE_AHEAD if is_ahead else _WHOLE
     if not whole or may_be_result or abs(apart - whole * period) > near * period:

@@ -21,6 +21,7 @@ from syncrelay.explain.epochs import Reading
 from syncrelay.explain.known_soon import known_soon
 from syncrelay.sync.messages import DropReason
 from tests.explain.support.cases import LIDAR, QUIET, camera, dropped, overflowing, wide
+from tests.explain.support.cases_stamps import AT_TICKS
 from tests.explain.support.groups import MS, NOW, S, a_group, a_silent_group, an_input
 
 WIDE = wide(*[5] * 40, *[30] * 60)
@@ -87,6 +88,15 @@ def test_a_cause_is_remembered_while_the_messages_of_its_time_are_judged_by():
     assert codes(a_judge.judge(a_group(figures={**since, "now": NOW + 9 * S, "last_set": NOW + 9 * S}))) == []
     later = {**WIDE, "nearest_from": NOW + S, "now": NOW + 11 * S, "last_set": NOW + 11 * S}
     assert codes(a_judge.judge(a_group(figures=later))) == [Code.OVER_SLOP]
+
+
+@pytest.mark.parametrize(("since", "found"), [(NOW, []), (NOW + 5 * S, [Code.OVER_SLOP])])
+def test_at_ticks_a_cause_is_remembered_while_the_delays_of_its_time_are_judged_by(since, found):
+    a_judge, later = Judge(), {"rate_hz": 5.0, **dict.fromkeys(("now", "last_set", "nearest_from"), NOW + 9 * S)}
+    late = {"pace_hz": 10.0, "delays": (S,) * 20, "received": [since + n * 100 * MS for n in range(20)]}
+    assert codes(a_judge.judge(a_group(waited=3 * S, **AT_TICKS))) == [Code.TOO_SLOW]
+    both = camera(figures=late), an_input("/lidar", figures=late)
+    assert codes(a_judge.judge(a_group(*both, figures=later, **AT_TICKS))) == found
 
 
 def test_sets_that_were_too_wide_until_now_are_why_they_are_missing():

@@ -385,6 +385,7 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "periods to tell": (0, 40, 4, lambda n: is_steady(*[10 * MS] * n)),
     "periods to tell of any": (0, 40, 18, lambda n: is_steady(*[MS * each for each in _UNEVEN[:n]])),
     "whole multiples": (5 * MS, 0, 564_842, lambda by: is_steady(*[10 * MS] * 4, *[20 * MS + by] * 3)),
+    "one at least": (0, 5 * MS, 4_524_839, lambda by: is_steady(*[by] * 4, 5 * MS, *[10 * MS] * 12)),
     "about as long": (0, 10 * MS, 7_500_000, lambda by: is_steady(*[by] * 8, *[10 * MS] * 15, *[25 * MS] * 8)),
     "no longer": (20 * MS, 10 * MS, 12_500_000, lambda by: is_steady(*[MS] * 8, *[10 * MS] * 15, *[by] * 8)),
     "most about as long": (10, 20, 11, lambda n: is_steady(*[10 * MS] * n, *[25 * MS] * (20 - n))),

@@ -140,6 +140,11 @@ QUIETLY = {
         "a constant distance of inputs of two rates": a_group(
             camera(figures=stamped(-80 * MS, delay=85 * MS, pace_hz=12)), an_input("/lidar", figures=stamped(0))
         ),
+        "a delay of nearly a period by a simulated clock, which comes in ticks": a_group(
+            camera(figures=stamped(0, delay=40 * MS)),
+            an_input("/lidar", figures=stamped(0, delay=-50 * MS)),
+            clock=ClockState(received=True),
+        ),
     },
     Code.OTHER_CLOCK: {
         "another clock while sets leave": a_group(camera(figures={"delay": 37_205 * MS}), LIDAR),
