@@ -283,6 +283,8 @@ class Link:
 
     def _lose(self, sample: Sample) -> None:
         self.under_way -= 1
+        if self.writer.bus.lost is not None:
+            self.writer.bus.lost(self.reader)
         if self.expected is not None:
             self.reader.lost += 1
             self.expected = sample.number + 1
@@ -449,6 +451,8 @@ class Bus:
         """Called at each write."""
         self.taken: Callable[[Reader, Sample], object] | None = None
         """Called for each message that a reader takes."""
+        self.lost: Callable[[Reader], object] | None = None
+        """Called for each message that is lost on the way to a reader."""
         self.may_make: Callable[[Endpoint], object] = lambda _: None
         """Called before each endpoint is made: what it raises, as a RefusedByDdsError, refuses that."""
 

@@ -3,7 +3,7 @@
 import logging
 import re
 from bisect import bisect_left
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -147,7 +147,9 @@ class Promises:
         self._running: set[GroupRelay] = set()
         self._taken: dict[str, dict[Reader, dict[bytes, list[int]]]] = defaultdict(lambda: defaultdict(dict))
         world.bus.written = self._on_write
+        self._lost: Counter[str] = Counter()
         world.bus.taken = self._on_taken
+        world.bus.lost = self._on_lost
         world.heard_write = self._on_heard
         world.drained = self._on_drained
 
@@ -158,6 +160,10 @@ class Promises:
         relay = self.world.relay
         if relay is not None and reader.participant.process is relay.process:
             self._taken[reader.topic][reader].setdefault(sample.gid, []).append(sample.number)
+
+    def _on_lost(self, reader: Reader) -> None:
+        relay = self.world.relay
+        self._lost[reader.topic] += relay is not None and reader.participant.process is relay.process
 
     def _on_write(self, writer: Writer, sample: Sample) -> None:
         place = self.world.outputs.get(writer.topic)
@@ -209,6 +215,9 @@ class Promises:
                 left = counts.matched + sum(counts.dropped.values()) + counts.buffered
                 if is_last:
                     self._look_for_miscounted(name, each.graph)
+                if each.graph.lost_in_all > (lost := self._lost[each.graph.name]):
+                    what = f"{lost} messages lost, told {each.graph.lost_in_all}"
+                    self.broken.append(f"{self.world.now:.2f} s: {name}: {each.name}: {what}")
                 if counts.fed != left or (is_last and counts.buffered):
                     self.broken.append(f"{self.world.now:.2f} s: {name}: {each.name}: {counts} does not add up")
             first = explanation(report.findings)
