@@ -133,9 +133,11 @@ def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
         return None
     found, received = _of_rate(last, scatter), [at for _, at in last]
     span = received[-1] - received[0]
-    # Of messages that were held up and come at once, stamps run fast too, but not over as long.
+    # Of messages that were held up and come at once, stamps run fast too, but not over as long. Those that a latched
+    # publisher kept may, and end at about the time that it is.
     if span < _WATCHED or median(map(sub, received[1:], received)) * len(received) < _EVENLY * span:
-        is_sure = found is not None and found.is_unit and abs(last[-1][0] - last[0][0]) > _NEVER_HELD
+        reach = abs(last[-1][0] - last[0][0])
+        is_sure = found is not None and found.is_unit and _NEVER_HELD < reach < abs(delays[-1])
         return found if is_sure else None
     return _of_parts(last, scatter) or found
 

@@ -341,7 +341,8 @@ def _longest_pause(an_input: InputFacts, absent: int) -> int:
     figures = an_input.figures
     if figures.longest_pause < _PAUSE:
         return 0
-    usual = round(SECOND / figures.pace_hz) if figures.pace_hz else median_low(figures.gaps)
+    # Where most come at once, any pause is longer than is usual.
+    usual = round(SECOND / figures.pace_hz) if figures.pace_hz else max(1, median_low(figures.gaps))
     pauses = [each for each in figures.gaps if each >= max(_PAUSE, _PAUSE_PERIODS * usual)]
     return max(pauses, default=0) if 2 * sum(each // usual for each in pauses) > absent else 0
 

@@ -306,6 +306,8 @@ class Link:
             reader.queue.popleft()
         reader.queue.append((sample, process.time_ns()))
         reader.on_data()
+        if self.writer.bus.arrived is not None:
+            self.writer.bus.arrived(reader)
 
 
 class BusNode:
@@ -451,6 +453,8 @@ class Bus:
         """Called at each write."""
         self.taken: Callable[[Reader, Sample], object] | None = None
         """Called for each message that a reader takes."""
+        self.arrived: Callable[[Reader], object] | None = None
+        """Called for each message that has arrived at a reader, before it can be taken."""
         self.lost: Callable[[Reader], object] | None = None
         """Called for each message that is lost on the way to a reader."""
         self.may_make: Callable[[Endpoint], object] = lambda _: None

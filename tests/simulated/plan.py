@@ -120,6 +120,8 @@ class Plan:
     """Whether the relay runs with --watch."""
     transforms: bool = False
     """Whether sets wait for transforms, which somebody publishes."""
+    prompt: bool = False
+    """Whether what happens waits for a message that has arrived and that nobody has taken."""
 
     @property
     def by_sim_time(self) -> bool:
@@ -139,7 +141,17 @@ class Plan:
         sensors = "\n".join(f"  {each}" for each in self.sensors)
         odd = {
             key: getattr(self, key)
-            for key in ("node", "eagerness", "lag_ms", "latency_ms", "discovery_ms", "missed", "watched", "transforms")
+            for key in (
+                "node",
+                "eagerness",
+                "lag_ms",
+                "latency_ms",
+                "discovery_ms",
+                "missed",
+                "watched",
+                "transforms",
+                "prompt",
+            )
         }
         return f"{self.length:.0f} s at {self.hz:g} Hz, {odd}\n{sensors}\n{groups}\n{steps}"
 
@@ -171,6 +183,9 @@ class Plan:
 def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
     """Draw a world. `kinds` says of each kind of step what it is about, and what the world must be like for it."""
     chance = Random(f"world {seed}")
+    # One kind is drawn first, and the world is made for it: what few worlds allow is as frequent as the rest.
+    first = chance.choice([*kinds])
+    needs = kinds[first]
     exact = chance.random() < 0.3
     # Each message costs as much as the last: a queue of 20 overflows at 15 Hz, when 1.5 s come at once.
     hz = chance.choice([2.0, 2.0, 3.0, 3.0, 5.0])
@@ -179,10 +194,15 @@ def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
     sensors = tuple(
         _sensor(chance, number, every=every, exact=exact) for number in range(chance.choice([2, 2, 3, 3, 4]))
     )
-    groups = tuple(_group(chance, f"g{n}", sensors, exact=exact, hz=hz) for n in range(chance.choice([1, 1, 2, 3])))
+    groups = tuple(
+        _group(chance, f"g{n}", sensors, exact=exact, hz=hz)
+        for n in range(chance.choice([2, 3] if "several" in needs else [1, 1, 2, 3]))
+    )
     # By chance of its own: worlds without transforms are those that they were.
     by_key = any("key" in group.options for group in groups)
-    transforms = _CAN_TRANSFORM and not by_key and Random(f"transforms {seed}").random() < 0.25
+    transforms = (
+        _CAN_TRANSFORM and not by_key and ("transforms" in needs or Random(f"transforms {seed}").random() < 0.25)
+    )
     if transforms:
         groups = tuple(replace(each, options={**each.options, "transforms": TRANSFORMS}) for each in groups)
     # By chances of their own: worlds without such a group stay as they were.
@@ -190,11 +210,11 @@ def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
     used = {topic for group in groups for topic in group.topics}
     sensors = tuple(each for each in sensors if each.topic in used)
     node: dict[str, Any] = {}
-    if chance.random() < 0.15:
+    if "sim" in needs or ("real" not in needs and chance.random() < 0.15):
         node["use_sim_time"] = True
-    if chance.random() < 0.15:
+    if "managed" in needs or chance.random() < 0.15:
         node["lifecycle"] = True
-    chaotic = chance.random() < 0.35
+    chaotic = "start" in needs or chance.random() < 0.35
     plan = Plan(
         seed,
         sensors,
@@ -210,8 +230,9 @@ def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
         missed=chance.choice([0.0, 0.0, 0.3]),
         watched=chance.random() < 0.3,
         transforms=transforms,
+        prompt=chance.random() < 0.5,
     )
-    steps = tuple(sorted(_steps(chance, plan, kinds, chaotic=chaotic)))
+    steps = tuple(sorted(_steps(chance, plan, kinds, first, chaotic=chaotic)))
     last = max((step.at + step.seconds for step in steps), default=SETTLED_S)
     rest = chance.uniform(0, 20) if chaotic else HEALED_S + 15
     return replace(plan, steps=steps, length=last + rest)
@@ -275,15 +296,18 @@ def _options(policy: str, first: str, hz: float) -> dict[str, Any]:
     return {"policy": policy, "slop": "30ms"}
 
 
-def _steps(chance: Random, plan: Plan, kinds: Mapping[str, Sequence[str]], *, chaotic: bool) -> Iterator[Step]:
+def _steps(
+    chance: Random, plan: Plan, kinds: Mapping[str, Sequence[str]], first: str, *, chaotic: bool
+) -> Iterator[Step]:
     """Draw what happens: one fault after the other, each healed before the next; or, in chaos, all at once."""
     at = SETTLED_S + chance.uniform(0, 10)
     fit = [kind for kind, needs in kinds.items() if _fits(plan, needs) and (chaotic or "start" not in needs)]
     fit = [kind for kind in fit if not plan.transforms or kind not in _OTHER_STAMPS]
     # A few kinds again and again meet in more ways than one of each.
-    fit = chance.sample(fit, k=chance.choice([4, 8, len(fit)])) if chaotic else fit
+    begin = [first] if first in fit else []
+    fit = [*begin, *chance.sample(fit, k=chance.choice([4, 8, len(fit)]))] if chaotic else fit
     for _ in range(chance.randint(4, 14) if chaotic else chance.choice([1, 1, 2, 3])):
-        kind = chance.choice(fit)
+        kind = begin.pop() if begin else chance.choice(fit)
         target = ""
         if "sensor" in kinds[kind]:
             target = chance.choice(plan.sensors).topic
@@ -291,9 +315,9 @@ def _steps(chance: Random, plan: Plan, kinds: Mapping[str, Sequence[str]], *, ch
             target = chance.choice(plan.groups).name
         is_brief = "brief" in kinds[kind]
         if chaotic:
-            begin = 0.0 if "start" in kinds[kind] else chance.uniform(2, 60)
+            at = 0.0 if "start" in kinds[kind] else chance.uniform(2, 60)
             seconds = chance.choice([0.3, 3.0, chance.uniform(0, 30)])
-            yield Step(begin, kind, target, 0.0 if is_brief else seconds)
+            yield Step(at, kind, target, 0.0 if is_brief else seconds)
             continue
         seconds = 0.0 if is_brief else chance.uniform(NAMED_S + 5, NAMED_S + 25)
         yield Step(at, kind, target, seconds)

@@ -62,7 +62,8 @@ def _run(world: World, promises: Promises) -> list[str]:
     scheduler, plan = world.scheduler, world.plan
     world.start()
     for step in plan.steps:
-        scheduler.after(round(step.at * SECOND), partial(_happen, world, step.kind, step.target, step.seconds))
+        happen = partial(_happen, world, step.kind, step.target, step.seconds)
+        scheduler.after(round(step.at * SECOND), partial(world.upon_arrival, happen) if plan.prompt else happen)
     try:
         while world.now < plan.length:
             scheduler.sleep(_LOOK_S)

@@ -45,6 +45,8 @@ _ASLEEP_S: Final = 8.0
 # What is said of a group's sets is held against those of so long, if it was looked at all the while.
 _SHOWN_S: Final = 25.0
 _LOOKS_S: Final = 3.0
+# So many messages a publisher keeps at most.
+_KEPT: Final = 100
 _SETS_ARE_MISSING: Final = frozenset({"few_sets", "over_slop", "unexplained"})
 _SILENT_FOR: Final = re.compile(r"(/\w+) has been silent for ([\d.]+) s|without (/\w+).*silent for ([\d.]+) s")
 _QUIET: Final = frozenset({"healthy", "starting", "nobody_listens"})
@@ -220,6 +222,7 @@ class Promises:
                     self.broken.append(f"{self.world.now:.2f} s: {name}: {each.name}: {what}")
                 if counts.fed != left or (is_last and counts.buffered):
                     self.broken.append(f"{self.world.now:.2f} s: {name}: {each.name}: {counts} does not add up")
+            self._look_for_impossible(report)
             first = explanation(report.findings)
             topics = self._group(name).topics
             about = frozenset(topics[index] for index in first.about)
@@ -271,6 +274,17 @@ class Promises:
         truth = [sum(each[-1] - each[0] + 1 for each in numbers.values()), sum(map(len, numbers.values()))]
         if told != truth:
             self.broken.append(f"{self.world.now:.2f} s: {name}: {shown.name}: {truth} sent and delivered, told {told}")
+
+    def _look_for_impossible(self, report: "GroupReport") -> None:
+        """Look whether more sets are called possible than messages can have come, also twice or kept ones."""
+        share, fastest = (
+            report.facts.figures.share,
+            self.world.plan.hz * max(each.every for each in self._sensors.values()),
+        )
+        most = 2 * fastest * share.ns / SECOND + _KEPT
+        if share.possible > most:
+            what = f"{share.possible} sets are called possible in {share.ns / SECOND:.1f} s"
+            self.broken.append(f"{self.world.now:.2f} s: {report.facts.name}: {what}, of {most:.0f} at most")
 
     def _look_for_unjudged(self, name: str) -> None:
         now, before = self.world.now, self._judged[name]

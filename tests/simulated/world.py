@@ -269,6 +269,8 @@ class World:
             discovery=round(plan.discovery_ms * MS), latency=round(plan.latency_ms * MS), missed=plan.missed
         )
         self.bus = Bus(self.scheduler, weather)
+        self.bus.arrived = self._on_arrival
+        self._upon_arrival: list[Callable[[], object]] = []
         self.outputs = {
             f"/{group.name}{topic}": (group.name, index)
             for group in plan.groups
@@ -338,6 +340,22 @@ class World:
         now, last = self.scheduler.now, self._rig_clock[-1]
         if last.until < _NEVER:
             self._rig_clock.append(_Span(now, last.offset + last.until - now))
+
+    def upon_arrival(self, event: Callable[[], object]) -> None:
+        """Have an event happen as the next message has arrived at the relay, or in a second if none does."""
+        waiting = self._upon_arrival
+        waiting.append(event)
+
+        def wait_no_longer() -> None:
+            if event in waiting:
+                waiting.remove(event)
+                event()
+
+        self.scheduler.after(SECOND, wait_no_longer)
+
+    def _on_arrival(self, reader: Reader) -> None:
+        while self._upon_arrival and self.relay is not None and reader.participant.process is self.relay.process:
+            self._upon_arrival.pop(0)()
 
     def write_file(self, text: str | None = None) -> None:
         """Write the relay's file as it is to be now, or a text."""
