@@ -86,12 +86,12 @@ class Losses:
         self._totals: deque[int] = deque(maxlen=_RECENT)
         self.total = 0
         """How many were lost since the relay started."""
-        self._publishers = 0
+        self._publishers: frozenset[bytes] = frozenset()
         self._settling = 0
 
-    def observe(self, total: int, *, publishers: int) -> None:
-        """Take the total lost since the subscription was made, and how many publishers there are."""
-        if publishers > self._publishers or (self._totals and total < self._totals[-1]):
+    def observe(self, total: int, *, publishers: frozenset[bytes]) -> None:
+        """Take the total lost since the subscription was made, and the gids of the publishers that there are."""
+        if publishers - self._publishers or (self._totals and total < self._totals[-1]):
             self._settling = _SETTLING
         if self._settling:
             self._settling -= 1

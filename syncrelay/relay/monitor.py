@@ -170,7 +170,8 @@ class Monitor:
             self._clock.observe(self._node.ros_time_ns(), now=now)
         for topic, losses in self._losses.items():
             # A new subscription discovers its publishers anew.
-            losses.observe(topic.lost(), publishers=len(topic.publishers) if topic.entity is not None else 0)
+            publishers = topic.publishers if topic.entity is not None else ()
+            losses.observe(topic.lost(), publishers=frozenset(each.gid for each in publishers))
         self._empty_graph = self._surroundings.empty_graph()
         if self._discovery.goes_on(self._runtime.monotonic()):
             self._discovery.observe(self._surroundings.nodes_and_topics(), now=self._runtime.monotonic())
