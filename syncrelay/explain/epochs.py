@@ -110,7 +110,7 @@ def time_scale(newest: int, behind: int) -> TimeScale | None:
         return TimeScale(f"look like {_FROM_1980}", None)
     zones, rest = divmod(abs(behind) + _ZONE // 2, _ZONE)
     if 0 < zones <= _MOST_ZONES and abs(rest - _ZONE // 2) < _SECOND:
-        return TimeScale("look like local time, not UTC", zones * _ZONE if behind > 0 else -zones * _ZONE)
+        return TimeScale("look like local time, not UTC", round(behind / _ZONE) * _ZONE)
     return None
 
 

@@ -88,7 +88,7 @@ def _edge(missing: Missing) -> str:
 
 def _late(missing: Missing, name: str, covered: Sequence[Lapse], facts: GroupFacts) -> tuple[str, str]:
     edge, wait = _edge(missing), facts.transforms.wait if facts.transforms is not None else 0
-    needed = max((each.needed_ns or 0 for each in covered), default=0)
+    needed = _needed(covered)
     enough = enough_wait(covered)
     if not covered and not missing.by_ns:
         return f"nothing is known of {edge} yet", _CHECK_BROADCASTER
@@ -106,10 +106,13 @@ def _late(missing: Missing, name: str, covered: Sequence[Lapse], facts: GroupFac
 
 def enough_wait(lapses: Sequence[Lapse]) -> str | None:
     """Return the wait that sets which were given up would have needed, and a tenth more; None if none is for that."""
-    covered = [each for each in lapses if each.needed_ns is not None]
-    needed = max((each.needed_ns or 0 for each in covered), default=0)
-    times = [each.covered or 0 for each in covered]
+    needed = _needed(lapses)
+    times = [each.covered for each in lapses if each.covered is not None]
     # What came back after a break had all that waited leave at once, or nearly: no wait is for that.
     if not times or max(times) - min(times) < needed or needed > _LONGEST_WAIT:
         return None
     return words.at_least(min(needed + needed // 10, _LONGEST_WAIT))
+
+
+def _needed(lapses: Sequence[Lapse]) -> int:
+    return max((each.needed_ns for each in lapses if each.needed_ns is not None), default=0)

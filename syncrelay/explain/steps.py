@@ -122,7 +122,7 @@ class StampSteps:
         low, high = self._range or (min(levels), max(levels))
         margin = (high - low) * max(1, _KNOWN_OF / len(levels)) + _LEAST
         side = (least > high + margin) - (least < low - margin)
-        if not side or (self._off and (self._off[-1] > high) is not (side > 0)):
+        if not side or (self._off and (self._off[-1] > high) is not (side == 1)):
             self._off.clear()
             self._range = None
             if low <= least <= high and low < levels[0] < high:
@@ -150,7 +150,7 @@ class StampSteps:
         is_level = max(latest) - min(latest) <= max(_ALIKE * abs(by), margin)
         if not is_level and len(self._off) < _GIVEN_UP:
             return None
-        if not is_level or (side > 0 and self._change.took > period() + abs(by) / 2):
+        if not is_level or (side == 1 and self._change.took > period() + abs(by) / 2):
             # They may be as late as that, and need not stay so.
             self._levels.extend(self._off)
             self._off.clear()

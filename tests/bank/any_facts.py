@@ -4,6 +4,7 @@ No rig is played, so thousands are judged in a second; and what no rig comes to,
 """
 
 import random
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, Final, TypeAlias
@@ -24,6 +25,7 @@ from syncrelay.explain import (
     with_ok,
 )
 from syncrelay.explain.epochs import Reading
+from syncrelay.explain.summary import summarize
 from syncrelay.explain.troubles import troubles
 from syncrelay.status.state import group_of
 from syncrelay.sync.messages import DropReason
@@ -31,6 +33,7 @@ from tests.explain.support import cases_flow, cases_graph, cases_stamps, cases_t
 from tests.explain.support.groups import BEGAN, MS, S
 
 Pool: TypeAlias = dict[tuple[type, str], list[Any]]
+_Dial: TypeAlias = tuple[Callable[[Any], Any], Any, Any]
 
 _CASES: Final = [
     facts
@@ -52,9 +55,14 @@ _COUNTS: Final = (0, 1, 2, 3, 4, 5, 9, 10, 11, 19, 20, 50, 94, 95, 99, 100)
 _LOOKS: Final = 6
 _MOST: Final = 6
 _CHANGES: Final = 0.3
+_DIALS: Final = 60
+_DEEPER: Final = 0.8
+_CODE: Final = re.compile(r"<(\w+)>")
+_FIGURE: Final = re.compile(r"-?\d[\d.e-]* ?\w*")
 # As long as another, and what is no more than a few: the index of an input.
 _AS_LONG: Final = frozenset({"missing", "sets_since_without", "spans", "latencies"})
 _AS_IN_CASES: Final = frozenset({"trigger", "pacemaker", "unsteady", "every", "name", "required"})
+_NOT_TURNED: Final = _AS_IN_CASES | {"input"}
 # What files may ask for, and no case has.
 _MORE: Final[Pool] = {
     (GroupFacts, "every"): [2, 5],
@@ -96,8 +104,98 @@ def said_of(chance: random.Random) -> Iterator[tuple[str, str]]:
             yield from ((one.code.value, str(one)) for one in with_ok(facts, each))
             last = [RecentDrop(index, now, chance.choice(list(DropReason))) for index in range(len(facts.inputs))]
             yield "", str(group_of(GroupReport(facts, each, last, log)).as_dict())
+            counts = [(one.name, one.counts) for one in facts.inputs]
+            yield "", "; ".join(summarize(facts.name, facts.figures.sets, counts, facts.fates))
         yield from (("", line.text) for line in causes.lines(now=now))
         yield from (("", str(each)) for each in troubles([*zip(groups, found, strict=True)], causes.published_by))
+
+
+def at_limits(chance: random.Random) -> Iterator[tuple[str, str]]:
+    """Yield where what is said becomes another while one number goes from what it is to another, and all that is said.
+
+    Of what is near to a limit, nothing but the limit itself tells which side of it is which.
+    """
+    facts = _some_changed(chance.choice(_CASES), chance)
+    before = chance.choice([None, facts, _some_changed(facts, chance)])
+    facts = _goes_on(facts, chance.choice([0, S, 5 * S, 20 * S]))
+    for _ in range(_DIALS):
+        dial = _dial(facts, chance)
+        if dial is None:
+            continue
+        turned, low, high = dial
+        said = _all_said(before, turned(low))
+        kind = _without_figures(said)
+        if kind == _without_figures(_all_said(before, turned(high))):
+            continue
+        while (middle := (low + high) / 2 if isinstance(low + high, float) else (low + high) // 2) not in (low, high):
+            if _without_figures(_all_said(before, turned(middle))) == kind:
+                low = middle
+            else:
+                high = middle
+        yield from (("", f"{each} {_all_said(before, turned(each))}") for each in (low, high))
+        yield from ((code, "") for code in _CODE.findall(said))
+
+
+def _all_said(before: GroupFacts | None, facts: GroupFacts) -> str:
+    """Return all that is said of a group, after a look at what it was before."""
+    judge, log, said = Judge(), FindingLog(), []
+    for each in [facts] if before is None else [before, facts]:
+        found = judge.judge(each)
+        said = [f"<{one.code.value}> {one}" for one in with_ok(each, found)]
+        said += [str(remark) for remark in log.remarks(each, found, judge.explained(each))]
+    return "\n".join([*said, *(f"{each.lasted} {each.text}" for each in log.spells)])
+
+
+def _without_figures(text: str) -> str:
+    return _FIGURE.sub("", text)
+
+
+def _dial(value: Any, chance: random.Random) -> _Dial | None:
+    """Return how a record is with another of the numbers in it, that number, and another; None of what has none.
+
+    Of many, some or all are moved together.
+    """
+    parts = [(name, part) for name, part in _parts(value) if name not in _NOT_TURNED and _has_numbers(part)]
+    records = [each for each in parts if not isinstance(each[1], int | float | Distribution)]
+    if not parts:
+        return None
+    name, part = chance.choice(records if records and chance.random() < _DEEPER else parts)
+
+    def put(new: Any) -> Any:
+        return _with(value, name, new)
+
+    by = chance.choice([-1, 1]) * chance.choice(_ROUND)
+    match part:
+        case int() | float():
+            return put, part, _number_near(part, chance)
+        case Distribution():
+            kept = part.newest(len(part))
+            return lambda more: put(Distribution([each + more for each in kept])), 0, by
+        case [int(), *_] if not hasattr(part, "_fields"):
+            at = chance.randrange(len(part))
+            among = chance.choice([range(len(part)), range(at, len(part)), [at]])
+            moved = [place in among and isinstance(each, int) for place, each in enumerate(part)]
+            return (
+                lambda more: put(
+                    tuple(each + more if is_of else each for each, is_of in zip(part, moved, strict=True))
+                ),
+                0,
+                by,
+            )
+        case [_, *_] if not hasattr(part, "_fields"):
+            at = chance.randrange(len(part))
+            inner, put_inner = _dial(part[at], chance), lambda new: put((*part[:at], new, *part[at + 1 :]))
+        case _:
+            inner, put_inner = _dial(part, chance), put
+    return inner and (lambda number: put_inner(inner[0](number)), *inner[1:])
+
+
+def _has_numbers(value: Any) -> bool:
+    if isinstance(value, tuple | list) and not hasattr(value, "_fields"):
+        return bool(value) and (isinstance(value[0], int) or _has_numbers(value[0]))
+    return isinstance(value, int | float | Distribution) is not isinstance(value, bool) or any(
+        _has_numbers(each) for _, each in _parts(value)
+    )
 
 
 def _parts(value: Any) -> Iterator[tuple[str, Any]]:

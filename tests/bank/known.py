@@ -19,7 +19,8 @@ from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.troubles import troubles
 from syncrelay.status.state import group_of
 from tests.bank.any_arrivals import judged
-from tests.bank.any_facts import said_of
+from tests.bank.any_facts import at_limits, said_of
+from tests.bank.any_rigs import played
 from tests.bank.any_trials import answers
 from tests.bank.kinds import KINDS
 from tests.bank.play import Drawn, drawn, publishers_of
@@ -138,16 +139,21 @@ def known(fixed: Fixed) -> str:
         if shown.code.value != before:
             before = shown.code.value
             lines.append(f"{second:.2f} {before}: {shown.text}; {shown.suggestion or ''}")
-        log.hear(facts, found, remarks, now=facts.figures.now)
-        logged = [line.text for line in log.lines(now=facts.figures.now)]
-        told = [each.text for each in troubles([(facts, found)], log.published_by)]
-        digest.update(json.dumps([group_of(GroupReport(facts, found)).as_dict(), logged, told]).encode())
+        digest.update(_shown(facts, found, remarks, log).encode())
         observed.update(str(_plain(facts)).encode())
 
     shown = publishers_of(draw.rig.flows)
     seconds = int(draw.seconds) + 1
     run(*sources, seconds=seconds, options=options, publishers=shown, looks=draw.looks, hears=hears, **beside)
     return "\n".join([*lines, f"{digest.hexdigest()[:12]} {observed.hexdigest()[:12]}"])
+
+
+def _shown(facts: GroupFacts, found: tuple[Finding, ...], remarks: list[Remark], log: CauseLog) -> str:
+    """Return what is shown in the status, logged and told of causes."""
+    log.hear(facts, found, remarks, now=facts.figures.now)
+    logged = [line.text for line in log.lines(now=facts.figures.now)]
+    told = [each.text for each in troubles([(facts, found)], log.published_by)]
+    return json.dumps([group_of(GroupReport(facts, found)).as_dict(), logged, told])
 
 
 def _told(told: Callable[[random.Random], Iterable[tuple[str, str]]], fixed: Fixed) -> Iterator[str]:
@@ -166,7 +172,18 @@ def _seen(chance: random.Random) -> Iterator[tuple[str, str]]:
         yield from ((each.code.value, str(each)) for each in found)
 
 
-_WITHOUT_A_RIG: Final = {"facts": said_of, "trials": answers, "arrivals": _seen}
+def _played(chance: random.Random) -> Iterator[tuple[str, str]]:
+    said, log = list[tuple[str, str]](), CauseLog()
+
+    def hears(_second: float, facts: GroupFacts, found: tuple[Finding, ...], remarks: list[Remark]) -> None:
+        said.append(("", f"{_shown(facts, found, remarks, log)} {_plain(facts)}"))
+        said.extend((each.code.value, str(each)) for each in with_ok(facts, found))
+
+    played(chance, hears)
+    yield from said
+
+
+_WITHOUT_A_RIG: Final = {"facts": said_of, "limits": at_limits, "trials": answers, "arrivals": _seen, "rigs": _played}
 
 
 def _plain(value: Any) -> Any:

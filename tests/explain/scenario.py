@@ -30,6 +30,7 @@ from syncrelay.explain import (
     Standstill,
 )
 from syncrelay.explain.finding_log import Remark
+from syncrelay.explain.trials import Trials
 from syncrelay.relay.types import SettlingType
 from syncrelay.sync import DropReason, Match, Message, Outcome
 
@@ -154,6 +155,7 @@ def run(
     looks: Sequence[float] | None = None,
     rest_s: float = 0.0,
     hears: Callable[[float, GroupFacts, tuple[Finding, ...], list[Remark]], None] | None = None,
+    whole: Callable[[], Trials] | None = None,
 ) -> Told:
     """Run a rig for so many seconds, and look at it at each, or at those that are given.
 
@@ -162,7 +164,8 @@ def run(
     when nobody listens to a lazy group: it receives nothing. `paused` is when the relay is paused.
 
     `publishers` gives what the graph shows of a topic at a second, `facts` more keywords of `GroupWatch.facts`.
-    `hears` is called at each look with what the group's log would say, and of what.
+    `hears` is called at each look with what the group's log would say, and of what. `whole` gives trials on all
+    messages, where values are suggested as of a recording.
     """
     config = group_of(sources, options or {})
     names = [topic.topic for topic in config.topics]
@@ -170,7 +173,7 @@ def run(
         *(_arrivals(each, names, seconds, _chance(seed, place, each)) for place, each in enumerate(sources)),
         key=itemgetter(0, 1),
     )
-    relay = _Relay(config, paused, hears)
+    relay = _Relay(config, paused, hears, whole)
     heard = (each for each in arrivals if _until(sleeps, each[0]) == each[0])
     # Of what comes at once on a topic, one may have no stamp that could be compared.
     waiting = sorted(((_until(stops, at), index, stamp) for at, index, stamp in heard), key=itemgetter(0, 1))
@@ -261,6 +264,7 @@ class _Relay:
         config: GroupConfig,
         paused: Sequence[tuple[float, float]],
         hears: Callable[[float, GroupFacts, tuple[Finding, ...], list[Remark]], None] | None,
+        whole: Callable[[], Trials] | None,
     ) -> None:
         self._hears = hears
         self._pauses = [(_ns(begin), _ns(end)) for begin, end in paused]
@@ -270,7 +274,7 @@ class _Relay:
         self._taken: list[Endpoint | None] = [None] * len(config.topics)
         self._driver = EngineDriver(config, self._leave)
         self._clocks = [topic.device_clock() for topic in config.topics]
-        self._watch = GroupWatch(config, began=BEGAN)
+        self._watch = GroupWatch(config, began=BEGAN, whole=whole)
         self._judge = Judge()
         self._log = FindingLog()
         self._arrived: tuple[list[tuple[int, int]], ...] = tuple([] for _ in config.topics)

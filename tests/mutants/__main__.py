@@ -36,7 +36,14 @@ _PLAYED: Final = "tests/conformance"
 _EVALUATED: Final = "tests/simulated/test_evaluation.py"
 ROOMS: Final = {
     "sync": ["tests/sync"],
-    "explain": ["tests/explain", "tests/bank/test_known.py", "tests/status", "tests/cli/test_tap.py"],
+    "explain": [
+        "tests/explain",
+        "tests/bank/test_known.py",
+        "tests/status",
+        "tests/cli/test_tap.py",
+        # Trials on whole recordings.
+        "tests/recordings/analysis",
+    ],
     "dataflow": ["tests/dataflow", "tests/status/test_taps.py", _PLAYED, _EVALUATED],
     "relay": [_PLAYED, _EVALUATED, "tests/ros"],
     "recordings/bag": ["tests/recordings/bag", "tests/recordings/analysis", "tests/recordings/datasets"],
