@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from syncrelay.config.names_in_graph import SCALARS
+
 _LAYOUT = json.loads((Path(__file__).parents[1] / "configs" / "foxglove.json").read_text())
 _PANELS: dict[str, dict[str, Any]] = _LAYOUT["configById"]
 # Of each type of panel, the keys that must be there.
@@ -22,17 +24,6 @@ def _paths(panel: dict[str, Any]) -> list[tuple[str, str]]:
     """Topic and fields of each path that a panel draws."""
     found = [_PATH.fullmatch(each["value"]) for each in panel.get("paths", ())]
     return [(each["topic"], each["fields"]) for each in found if each is not None]
-
-
-def plotted() -> list[str]:
-    """The topics of the plots."""
-    return [topic for name, panel in _PANELS.items() if name.startswith("Plot!") for topic, _ in _paths(panel)]
-
-
-def detailed() -> tuple[str, str]:
-    """The hardware id and name of the DiagnosticStatus whose values are shown."""
-    (panel,) = (panel for panel in _PANELS.values() if "selectedName" in panel)
-    return panel["selectedHardwareId"], panel["selectedName"]
 
 
 def _leaves(node: Any) -> Iterator[str]:
@@ -64,10 +55,13 @@ def test_numbers_are_the_data_of_a_float():
 
 
 def test_diagnostics_are_those_of_the_group_whose_numbers_are_drawn():
-    (node, group), *others = dict.fromkeys(tuple(topic.split("/")[1:3]) for topic in plotted())
+    topics = [topic for name, panel in _PANELS.items() if name.startswith("Plot!") for topic, _ in _paths(panel)]
+    (node, group), *others = dict.fromkeys(tuple(topic.split("/")[1:3]) for topic in topics)
     assert others == []
+    assert topics == [f"/{node}/{group}/{figure}" for figure in SCALARS]
     of_diagnostics = [panel for panel in _PANELS.values() if "topicToRender" in panel]
     assert {panel["topicToRender"] for panel in of_diagnostics} == {"/diagnostics"}
-    assert detailed() == (f"/{node}", f"{node}: {group}")
+    (detailed,) = (panel for panel in _PANELS.values() if "selectedName" in panel)
+    assert (detailed["selectedHardwareId"], detailed["selectedName"]) == (f"/{node}", f"{node}: {group}")
     (states,) = (panel for name, panel in _PANELS.items() if name.startswith("StateTransitions!"))
     assert _paths(states) == [("/diagnostics", f'status[:]{{name=="{node}: {group}"}}.level')]

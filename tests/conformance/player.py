@@ -183,7 +183,8 @@ class Player:
         """What was observed is noted."""
         self._until(lambda: self._observed, "the end of observing")
         for report in self._observed[0]:
-            self._note("observed", report.facts.name)
+            rivals = [endpoint.node for each in report.facts.inputs for endpoint in each.graph.rivals]
+            self._note("observed", report.facts.name, *rivals)
             for each in report.facts.inputs:
                 counts = each.counts
                 self._note(each.name, counts.fed, counts.matched, by_reason(counts.dropped), each.graph.largest)

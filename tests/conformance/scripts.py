@@ -2,6 +2,7 @@
 
 from typing import Any, Final
 
+from syncrelay.config.names_in_graph import SCALARS
 from tests.conformance.script import (
     ARRAY,
     BOOL,
@@ -238,8 +239,8 @@ _GRAPH: Final = (
         do.settled(), do.endpoints("/front/a", publishers=1), do.endpoints("/front/b", publishers=1), do.sleep(11)),
     short("names are remapped, and the node is in a namespace",
         do.publisher("/robot/cam"), do.publisher("/b", name="/b"),
-        do.relay(_front("a", "/b", output_prefix="/fused"),
-            names={"a": "/robot/cam", "__ns": "/robot", "__node": "fusion"}),
+        do.relay(_front("a", "/b", output_prefix="/fused"), node={"name": "other", "namespace": "/robot"},
+            names={"a": "/robot/cam", "__node": "fusion"}),
         do.subscriber("/fused/a"), do.subscriber("/fused/b"), do.ready(), do.sets(10, 20, of=("/robot/cam", "/b")),
         _out(2, "/fused/a", "/fused/b"), do.endpoints("/fused/a", publishers=1, named=True),
         do.endpoints("/robot/fusion/front/sets", publishers=1, named=True), do.call("status")),
@@ -281,6 +282,14 @@ _GRAPH: Final = (
             for step in (do.write("/a", stamp), do.write("/b", stamp), do.sleep(0.1))),
         do.write("/a", 70), do.endpoints("/front/a", publishers=0),
         do.endpoints("/syncrelay/front/sets", publishers=0), do.endpoints("/diagnostics", publishers=0), do.observed()),
+    long("who observes beside a relay publishes nothing, and neither sees a rival in the other",
+        _SENSORS, do.relay(PAIR, diagnostics={"scalars": True}), do.ready(), do.observe(PAIR, 9),
+        do.served("/a", 2), do.served("/b", 2),
+        *(step for stamp in range(10, 60, 10)
+            for step in (do.write("/a", stamp), do.write("/b", stamp), do.sleep(0.1))),
+        *(do.endpoints(each, publishers=1, named=True) for each in
+            ("/front/a", "/front/b", "/diagnostics", "/syncrelay/front/sets", "/syncrelay/front/sets_hz")),
+        do.finding("healthy", wordless=True), do.observed()),
     long("who observes looks longer where sets have just stopped",
         _SENSORS, do.observe(PAIR, 5), do.served("/a", 1), do.served("/b", 1), do.sleep(0.5),
         *(step for stamp in range(500, 3000, 500)
@@ -499,8 +508,8 @@ _LIFE: Final = (
         blind=("outputs",)),
     long("figures for plotting are published as long as the file asks for them",
         _SENSORS, do.relay(PAIR, diagnostics={"scalars": True}), do.ready(), do.sets(10, 20),
-        *(do.subscriber(f"/syncrelay/front/{each}", of=FLOAT) for each in ("sets_hz", "span_ms")),
-        *(do.out(f"/syncrelay/front/{each}", 2) for each in ("sets_hz", "span_ms")),
+        *(do.subscriber(f"/syncrelay/front/{each}", of=FLOAT) for each in SCALARS),
+        *(do.out(f"/syncrelay/front/{each}", 2) for each in SCALARS),
         do.file(PAIR, diagnostics={"scalars": False}), do.call("reload"),
         do.endpoints("/syncrelay/front/sets_hz", publishers=0), do.endpoints("/diagnostics", publishers=1),
         do.file(PAIR, diagnostics=None), do.call("reload"), do.endpoints("/diagnostics", publishers=0),
@@ -546,6 +555,7 @@ BUNDLED: Final = group({"topic": "/a", "type": IMAGE, "stamp": "receive"},
 IMAGE_DATA: Final = b"\0\1\0\0" + bytes(8) + b"\1\0\0\0\0\0\0\0" * 2 + bytes(4)
 COLOR_DATA: Final = b"\0\1\0\0" + bytes(16)
 BUNDLE_SET: Final = (do.feed("/a", 0, data=IMAGE_DATA), do.feed("/b", 0, data=COLOR_DATA))
+_NO_BUNDLE: Final = {"front": {**BUNDLED, "bundle": {"topic": "/set", "type": "missing_msgs/msg/Set"}}}
 _BUNDLES: Final = (
     long("sets leave in bundles, by the publisher that fits their inputs and the file",
         do.publisher("/a", of=IMAGE), do.publisher("/b", of=COLOR), do.relay({"front": BUNDLED}),
@@ -560,7 +570,13 @@ _BUNDLES: Final = (
     long("a subscriber that cannot be served with bundles beside their messages",
         do.publisher("/a", of=IMAGE, reliability="best_effort"), do.publisher("/b", of=COLOR),
         do.relay({"front": {**BUNDLED, "outputs": True}}), do.subscriber("/set", of=MARKER),
-        do.finding("subscriber_qos", naming="/set")),
+        do.finding("subscriber_qos", naming="/ears")),
+    long("another node publishes the bundles too",
+        do.publisher("/a", of=IMAGE), do.publisher("/b", of=COLOR),
+        do.relay({"front": {**BUNDLED, "outputs": True}}), do.ready(),
+        do.publisher("/set", of=MARKER, by="bag", node="bag"), do.endpoints("/set", publishers=2, named=True),
+        7 * (*BUNDLE_SET, do.sleep(1)),
+        do.finding("output_taken", naming="/bag publishes /set too")),
     long("a lazy group wakes for who takes its bundles, and goes on with their publisher",
         do.publisher("/a", of=IMAGE), do.publisher("/b", of=COLOR),
         do.relay({"front": {**BUNDLED, "lazy": True, "manifest": False}}), do.finding("nobody_listens"),
@@ -568,8 +584,11 @@ _BUNDLES: Final = (
         do.file({"front": {**BUNDLED, "lazy": True, "manifest": False, "slop": "49s"}}), do.call("reload"), BUNDLE_SET,
         do.out("/set", 2), do.endpoints("/set", publishers=1), blind=("outputs",)),
     long("bundles of a type that is not there",
+        do.publisher("/a", of=IMAGE), do.publisher("/b", of=COLOR), do.relay(_NO_BUNDLE),
+        do.finding("no_bundle", naming="/set")),
+    long("bundles of a type that is not there, beside their messages",
         do.publisher("/a", of=IMAGE), do.publisher("/b", of=COLOR),
-        do.relay({"front": {**BUNDLED, "bundle": {"topic": "/set", "type": "missing_msgs/msg/Set"}}}),
+        do.relay({"front": {**_NO_BUNDLE["front"], "outputs": True}}), do.ready(), BUNDLE_SET,
         do.finding("no_bundle", naming="/set")),
     long("a managed node that is deactivated ends its bundles and leaves the transforms",
         do.publisher("/a", of=IMAGE), do.publisher("/b", of=COLOR), do.publisher("/tf", of=TF),

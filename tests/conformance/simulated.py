@@ -88,6 +88,8 @@ class SimulatedWorld:
             is_simulated=config.node.use_sim_time,
             remaps=names,
         )
+        if purpose is Purpose.OBSERVE:
+            node.relay_name = f"{config.node.namespace.rstrip('/')}/{config.node.name}"
         return node, SimulatedBackend(self.runtime)
 
     def hold(self, node: Any, topic: str, type_name: str) -> object:

@@ -1,6 +1,5 @@
 """A rig of camera and lidar that play at their pace, a relay of them, and what its log says."""
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -47,23 +46,6 @@ def play(stage: Stage, frames: Sequence[Frame], *, node: str = "driver", **qos: 
     player.match()
     player.start(frames, speed=1)
     return player
-
-
-def assert_looked_at_a_healthy_rig(look: Process) -> None:
-    """One that observes a healthy group, as JSON, found it so, or what a busy machine makes of it; its end agrees."""
-    code = look.wait()
-    found = observed_problems(look)["front"]
-    assert found <= OF_A_BUSY_MACHINE, look.stdout
-    assert code == (1 if found else 0), look.stdout
-
-
-def observed_problems(look: Process) -> dict[str, set[str]]:
-    """The codes of what is wrong with each group, by one that observed and gave JSON."""
-    groups = json.loads(look.stdout)["groups"]
-    return {
-        group["name"]: {finding["code"] for finding in group["findings"] if finding["severity"] != "ok"}
-        for group in groups
-    }
 
 
 def wait_for_sets(relay: Process, more: int, group: str = "front") -> None:

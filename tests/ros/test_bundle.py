@@ -10,7 +10,7 @@ from tests.ros.cdr_messages import VECTOR, stamp_of, vector
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.frames import Frame
 from tests.ros.made_messages import MadeMessages, made
-from tests.ros.manifests import ERROR, MANIFEST_TYPE, Told, read
+from tests.ros.manifests import MANIFEST_TYPE, Told, read
 from tests.ros.processes import wait_until
 from tests.ros.relaying import play_until_out
 from tests.ros.stage import Collector, Stage, both_backends
@@ -165,24 +165,6 @@ def test_a_common_stamp_is_in_the_members_too_and_outputs_are_left_as_they_were(
         )
 
 
-@pytest.mark.parametrize(("outputs", "severity"), [(False, "error"), (True, "warn")])
-def test_a_type_that_is_not_there_is_said(stage: Stage, outputs: bool, severity: str):  # noqa: FBT001
-    relay = stage.relay(config({"front": _group(outputs=outputs)}, metrics=ANY_PORT))
-    topics = {_MANIFEST: MANIFEST_TYPE} | ({"/front/rig/left": VECTOR} if outputs else {})
-    collector = stage.collector(topics)
-    player = stage.player(_TOPICS)
-    play_until_out(player, collector, (_frames(number) for number in count(0, 3)), topics)
-    found = wait_for_finding(relay, "no_bundle", naming=["made_sets/msg/Pair cannot be imported", "/front/set"])
-    assert found["severity"] == severity
-    assert groups_of(relay)["front"]["level"] == severity
-    told = _last_told(collector)
-    said = "running: " if outputs else "waiting for its bundle, which cannot leave on /front/set"
-    relay.wait_for_log(f"front: {said}")
-    why = told.message if outputs else told.inputs[0].message
-    assert "made_sets/msg/Pair cannot be imported" in why
-    assert (told.level, told.bundle_sequence) == (ERROR, "0")
-
-
 def test_messages_of_another_definition_than_the_bundles_are_refused_with_both(
     stage: Stage, pair: MadeMessages, tmp_path_factory: pytest.TempPathFactory
 ):
@@ -201,10 +183,3 @@ def test_messages_of_another_definition_than_the_bundles_are_refused_with_both(
     player.is_up()
     found = wait_for_finding(relay, "no_bundle", naming=["/camera publishes /own", _HOLDER, ", here RIHS01_"])
     assert len(set(re.findall(r"RIHS01_[0-9a-f]{64}", found["text"]))) == 2
-
-
-def test_who_else_publishes_the_bundles_topic_is_said(sourced: Stage):
-    relay = sourced.relay(config({"front": _group()}, metrics=ANY_PORT))
-    sourced.player({"/front/set": _PAIR}, node="bag")
-    found = wait_for_finding(relay, "output_taken", naming=["/bag publishes /front/set too"])
-    assert "give the bundle another `topic`" in found["suggestion"]

@@ -3,19 +3,24 @@
 import json
 import re
 import signal
+from pathlib import Path
+from typing import Any
 
 import pytest
+from rosbags.typesys import Stores, get_typestore
 
 from tests.ros import relaying
 from tests.ros.cdr_messages import VECTOR, stamps_of
 from tests.ros.configs import LOSSLESS, config, inputs
-from tests.ros.processes import Process
+from tests.ros.processes import Process, wait_until
 from tests.ros.stage import Stage
 from tests.ros.streams import at, merged
 
 pytestmark = pytest.mark.ros
 
 _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
+_LOG = "rcl_interfaces/msg/Log"
+_STORE = get_typestore(Stores.ROS2_JAZZY)
 _PAIR_OUT = {"/front/camera": VECTOR, "/front/lidar": VECTOR}
 
 
@@ -26,14 +31,6 @@ def _front(**keys) -> str:
 def _end(relay: Process) -> None:
     relay.send(signal.SIGTERM)
     assert relay.wait() == 0
-
-
-def test_the_node_is_named_by_the_file_and_the_command_line_has_the_last_word(stage: Stage):
-    collector = stage.collector()
-    node = {"name": "fusion", "namespace": "/robot"}
-    relay = stage.relay(_front(node=node), "--ros-args", "-r", "__node:=other")
-    collector.process.wait_until(lambda: "/robot/other" in collector.nodes(), "the node")
-    relay.wait_for_log("[robot.other]: front: waiting for")
 
 
 def test_keys_of_the_file_among_the_parameters_are_warned_of_once_and_change_nothing(stage: Stage):
@@ -64,3 +61,18 @@ def test_json_logs_are_an_object_a_line_on_stderr_of_the_level_that_is_asked_for
     assert told.stdout == ""
     # On a slow machine an error may be said that nobody publishes.
     assert not re.search(r"\[(INFO|WARN)\]", silent.stderr)
+
+
+def test_rosout_says_where_a_line_was_logged(stage: Stage):
+    collector = stage.collector({"/rosout": _LOG})
+    stage.relay(_front())
+
+    def lines() -> list[Any]:
+        heard: list[Any] = [_STORE.deserialize_cdr(payload, _LOG) for payload in collector.payloads("/rosout")]
+        return [each for each in heard if each.msg.startswith("front: waiting for")]
+
+    wait_until(lines, "the line that it waits for publishers, on /rosout")
+    line = lines()[0]
+    assert (line.name, line.level) == ("syncrelay", 20)
+    text = Path(line.file).read_text().splitlines()[line.line - 1]
+    assert "_LOG." in text, (line.file, line.line)
