@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from tests.faults.extent import chosen
+from tests.recordings.datasets.drawn_messages import drawn_message
 from tests.ros import frames
 from tests.ros.cdr_messages import NS_PER_SECOND, STORE, STRING, VECTOR, padded, vector
 from tests.ros.configs import config, inputs, outputs
@@ -24,8 +25,6 @@ from tests.ros.streams import BEGIN, MS
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed: it is in the extra test")
-
-from rosbags.interfaces import Nodetype
 
 pytestmark = pytest.mark.ros
 
@@ -68,31 +67,8 @@ class Peer(Collector):
         self.do("play", file=str(path), speed=1)
 
 
-def _drawn(chance: random.Random, kind: Nodetype, of: Any) -> Any:
-    """A value of a field: numbers of all sizes, lists that are sometimes empty."""
-    if kind is Nodetype.NAME:
-        return STORE.types[of](*(_drawn(chance, *field) for _, field in STORE.fielddefs[of][1]))
-    if kind is Nodetype.BASE:
-        return _drawn_base(chance, of[0])
-    (inner, inner_of), length = of
-    length = length or chance.choice([0, 1, 5])
-    values = [_drawn(chance, inner, inner_of) for _ in range(length)]
-    return np.array(values, inner_of[0]) if inner is Nodetype.BASE and inner_of[0] != "string" else values
-
-
-def _drawn_base(chance: random.Random, name: str) -> Any:
-    if name == "string":
-        return "".join(chance.choices("ab /é", k=chance.randrange(9)))
-    if name == "bool":
-        return chance.random() < 0.5
-    if name.startswith("float"):
-        return chance.gauss(0, 1e3)
-    bits = int(name.lstrip("uint"))
-    return chance.getrandbits(bits) - (0 if name.startswith("u") else 1 << bits - 1)
-
-
 def _message(chance: random.Random, type_name: str, stamp: int, frame_id: str, size: int) -> bytes:
-    message = _drawn(chance, Nodetype.NAME, type_name)
+    message = drawn_message(STORE, type_name, chance)
     if hasattr(message, "header"):
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, NS_PER_SECOND)
         message.header.frame_id = frame_id
