@@ -10,7 +10,7 @@ import pytest
 
 from syncrelay.cli.demo import isolation
 from tests.cli.terminals import on_terminal
-from tests.ros.processes import DEADLINE_S
+from tests.ros.processes import DEADLINE_S, children_of, is_alive
 
 _DEMO = [sys.executable, "-m", "syncrelay", "demo"]
 
@@ -42,30 +42,19 @@ def _of_group(text):
     return sets, *span[:2], [tuple(int(count or 0) for count in counts) for counts in inputs]
 
 
-def children(pid):
-    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-
-
-def running(pid):
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except (FileNotFoundError, ProcessLookupError):
-        return False
-
-
 @pytest.mark.ros
 def test_it_matches_a_simulated_rig_until_a_signal_ends_it_sums_up_and_leaves_nothing(stage):
     demo = stage.start("demo", [*_DEMO, "--seed", "7"])
     demo.wait_until(
         lambda: re.search(r"camera_lidar: .* span .* lidar_imu: .* span", demo.stdout), "sets of both groups"
     )
-    sensors = children(demo.pid)
+    sensors = children_of(demo.pid)
     assert len(sensors) == 3
     assert all(b"--seed=7" in Path(f"/proc/{pid}/cmdline").read_bytes() for pid in sensors)
     stage.note_shared_memory()
     demo.send(signal.SIGTERM)
     assert demo.wait() == 0, demo.stderr
-    assert not any(map(running, sensors))
+    assert not any(map(is_alive, sensors))
     assert stage.left_in_shared_memory() == set()
     groups = summed_up(demo.stdout)
     assert set(groups) == {"camera_lidar", "lidar_imu"}
@@ -89,14 +78,14 @@ def test_it_matches_a_simulated_rig_until_a_signal_ends_it_sums_up_and_leaves_no
 def test_it_can_be_stopped_before_the_sensors_publish(stage):
     stage.before_each_sensor("import time; time.sleep(600)")
     demo = stage.start("demo", _DEMO)
-    demo.wait_until(lambda: len(children(demo.pid)) == 3, "the rig's processes")
-    sensors = children(demo.pid)
+    demo.wait_until(lambda: len(children_of(demo.pid)) == 3, "the rig's processes")
+    sensors = children_of(demo.pid)
     demo.send(signal.SIGINT)
     assert demo.wait() == 0
     assert demo.stdout == "Starting a simulated camera, lidar and IMU ...\n"
     # Of sensors that take their time to end, it may warn.
     assert [line for line in demo.said if not line.startswith("[WARN]")] == ["syncrelay: stopped before it started"]
-    assert not any(map(running, sensors))
+    assert not any(map(is_alive, sensors))
 
 
 # No sensor sends anything, and one of them hangs in DDS at its end.
@@ -114,7 +103,7 @@ def test_it_fails_if_no_set_came_and_removes_what_a_sensor_left_that_was_killed(
     stage.before_each_sensor(_ILL)
     demo = stage.start("demo", [*_DEMO, "--seconds", "2"])
     demo.wait_until(lambda: "lidar_imu" in demo.stdout, "a first line")
-    _, _, imu = children(demo.pid)
+    _, _, imu = children_of(demo.pid)
     stage.note_shared_memory()
     demo.wait_for_log("imu to end;")
     os.kill(imu, signal.SIGKILL)

@@ -1,13 +1,12 @@
 """Reading a file of any shape takes work in proportion to its size, counted in calls."""
 
-import sys
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
-from typing import Any
 
 import pytest
 
 from syncrelay.config import ConfigError, Problem, load_text
+from tests.calls import Calls
 from tests.faults.extent import chosen
 
 _SIZES = chosen(short=(150, 300), long=(300, 600))
@@ -58,28 +57,18 @@ def _file(*groups: str) -> str:
     return "version: 1\ngroups:\n" + "".join(f"  g{number}: {group}\n" for number, group in enumerate(groups))
 
 
-def _read(text: str, environ: dict[str, str], count: Callable[[Any, str, Any], None]) -> Sequence[Problem]:
-    """Read a text with each call counted; what is wrong with it."""
-    before = sys.getprofile()
-    sys.setprofile(count)
+def _read(text: str, environ: dict[str, str]) -> Sequence[Problem]:
     try:
         return load_text(text, environ=environ).notes
     except ConfigError as error:
         return error.problems
-    finally:
-        sys.setprofile(before)
 
 
 def _work(text: str, environ: dict[str, str]) -> int:
     """How many calls are made while a text is read, and how many characters of errors come of it."""
-    calls = 0
-
-    def count(_frame: Any, event: str, _argument: Any) -> None:
-        nonlocal calls
-        calls += event in ("call", "c_call")
-
-    problems = _read(text, environ, count)
-    return calls + sum(len(problem.path) + len(problem.text) for problem in problems)
+    with Calls() as calls:
+        problems = _read(text, environ)
+    return calls.count + sum(len(problem.path) + len(problem.text) for problem in problems)
 
 
 @pytest.mark.parametrize("shape", _SHAPES.values(), ids=_SHAPES)
@@ -92,17 +81,12 @@ def test_twice_as_much_of_anything_takes_about_twice_the_work(shape: Callable[[i
 
 @pytest.mark.long
 def test_a_valid_word_is_looked_for_only_as_often_as_somebody_may_read_of_it(environ):
-    looked = 0
-
-    def count(frame: Any, event: str, _argument: Any) -> None:
-        nonlocal looked
-        looked += event == "call" and frame.f_code is get_close_matches.__code__
-
-    problems = _read(_SHAPES["packages misspelt"](1100), environ, count)
-    assert looked == 1000 < len(problems)
+    with Calls(get_close_matches) as looked:
+        problems = _read(_SHAPES["packages misspelt"](1100), environ)
+    assert looked.count == 1000 < len(problems)
 
 
 def test_of_the_first_thousand_misspelt_keys_each_is_told_what_was_meant(environ):
-    problems = _read(_SHAPES["keys of the file misspelt"](1100), environ, lambda *_: None)
+    problems = _read(_SHAPES["keys of the file misspelt"](1100), environ)
     texts = [problem.text for problem in problems if problem.code == "unknown_key"]
     assert [text.endswith("did you mean `groups`?") for text in texts] == [True] * 1000 + [False] * 100

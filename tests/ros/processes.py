@@ -63,6 +63,14 @@ def children_of(pid: int) -> list[int]:
     return [int(child) for child in children.split()]
 
 
+def is_alive(pid: int) -> bool:
+    """Whether a process runs: one that ended is none, though nobody may have asked for its exit code yet."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
 class Process:
     """A started process whose stdout and stderr go to files.
 

@@ -15,7 +15,7 @@ from syncrelay.environment.quick_discovery import quick_discovery
 from syncrelay.environment.transport import PROFILES
 from syncrelay.fastdds_files import FOLDER
 from syncrelay.rig.schedule import SENSORS, schedule
-from tests.ros.processes import children_of, wait_until
+from tests.ros.processes import children_of, is_alive, wait_until
 from tests.ros.shared_memory import left_of, segments_of
 
 MS = 1_000_000
@@ -63,14 +63,6 @@ def hold(stage):
     return process
 
 
-def runs(pid):
-    # An orphan's corpse stays where the machine's process 1 buries none, as in many containers.
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except (FileNotFoundError, ProcessLookupError):
-        return False
-
-
 # What seldom happens by itself: two that leave a port at once, and each thinks that the other removes it.
 _PORTS_ARE_LEFT = """
 import contextlib, os
@@ -105,7 +97,7 @@ def test_the_sensors_end_with_the_process_that_started_them_and_the_last_removes
     held = set().union(*map(segments_of, sensors))
     holder.send(number)
     holder.wait()
-    wait_until(lambda: not any(map(runs, sensors)), "the end of the rig's processes")
+    wait_until(lambda: not any(map(is_alive, sensors)), "the end of the rig's processes")
     # Where a sensor has no time left to put back what it kept.
     for sensor in sensors:
         for kept in FOLDER.glob(f"kept_{sensor}_*"):
@@ -125,7 +117,7 @@ def test_sensors_that_hang_do_not_outlive_the_process_that_started_them(stage):
     holder = hold(stage)
     sensors = children_of(holder.pid)
     holder.send(signal.SIGKILL)
-    wait_until(lambda: not any(map(runs, sensors)), "the end of the rig")
+    wait_until(lambda: not any(map(is_alive, sensors)), "the end of the rig")
 
 
 _AT_THE_END = """

@@ -2,12 +2,12 @@
 
 import gc
 import random
-import sys
 import weakref
 
 import pytest
 
 from syncrelay.sync import ApproximateTime, ApproximateTimeEager, Message, SyncGroup
+from tests.calls import Calls
 from tests.faults.extent import chosen
 from tests.sync.support.streams import MS, gappy, in_order
 
@@ -17,18 +17,10 @@ POLICIES = [ApproximateTime, ApproximateTimeEager]
 
 def calls_of_each(policy, events):
     """How many functions, Python's or C's, each event calls."""
-    counts: list[int] = []
-
-    def count(_, kind, __):
-        counts[-1] += kind in ("call", "c_call")
-
     for index, stamp in events:
-        message = Message(index, stamp, None)
-        counts.append(0)
-        sys.setprofile(count)
-        policy.add(message)
-        sys.setprofile(None)
-    return counts
+        with Calls() as calls:
+            policy.add(Message(index, stamp, None))
+        yield calls.count
 
 
 @pytest.mark.parametrize("policy", POLICIES)

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 
@@ -16,20 +15,13 @@ from tests.cli.command import ROOT
 from tests.faults.extent import chosen
 from tests.recordings.fleet.fleets import FILE, LEDGER, entries, make_fleet, replay_into, tree
 from tests.recordings.fleet.tasks import OBEDIENT, attempts_of
-from tests.ros.processes import children_of, wait_until
+from tests.ros.processes import children_of, is_alive, wait_until
 
 pytestmark = pytest.mark.process
 
 _DEADLINE_S = 60
 _KILLS = chosen(short=3, long=50)
 ENVIRON = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONSAFEPATH": "1"}
-
-
-def is_alive(pid):
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
-    except OSError:
-        return False
 
 
 def lines(out):
