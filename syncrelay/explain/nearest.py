@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from syncrelay.clock import UNREADABLE
 from syncrelay.config import Distance
-from syncrelay.explain.rows import Column, Rows, blocks, median, steps
+from syncrelay.explain.rows import Column, Rows, blocks, median, quantiles, steps
 from syncrelay.sync import Message
 
 Nanoseconds: TypeAlias = npt.NDArray[np.int64]
@@ -155,9 +155,9 @@ def signed_distances(stamps: Column, others: Column) -> Nanoseconds:
     return np.concatenate(between)
 
 
-def quantile(values: Nanoseconds, share: float) -> int:
+def quantile(values: Column, share: float) -> int:
     """Return the value that `share` of all do not exceed; it occurred. Floats would lose an epoch's nanoseconds."""
-    return int(np.quantile(values, share, method="inverted_cdf"))
+    return quantiles(lambda: blocks(values), [share])[0]
 
 
 def tightest_spans(count: int, found: Sequence[Sides]) -> tuple[Nanoseconds, Nanoseconds]:

@@ -1,7 +1,7 @@
 """The sets that there could be of messages, whatever the slop and the queues."""
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Final
@@ -18,12 +18,11 @@ from syncrelay.explain.nearest import (
     Sides,
     in_order,
     period_of,
-    quantile,
     shifted,
     sides,
     tightest_spans,
 )
-from syncrelay.explain.rows import BLOCK, Column, blocks, quantiles, steps
+from syncrelay.explain.rows import BLOCK, Column, Rows, blocks, extent, quantiles, steps
 from syncrelay.sync.latest_at_ticks import REST_NS
 from syncrelay.sync.ticks import Ticks
 
@@ -34,6 +33,9 @@ _PERIODS: Final = 1.5
 _FAR_OFF: Final = 4
 # Of a steady input, the nearest message is at most half a period away, and its jitter, unless it was lost.
 _NOT_NEAREST: Final = 0.6
+# A row for each of the pivot's messages: its stamp; of the tightest set around it the span, the fullest queue, whether
+# a partner was lost, and the numbers of all partners.
+_STAMP, _SPAN, _QUEUE, _IS_LOST, _PARTNERS = range(5)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,20 +50,17 @@ class PossibleSets:
 
     among: tuple[int, ...]
     pivot: int
-    stamps: Nanoseconds
-    spans: Nanoseconds
-    queues: Nanoseconds
+    stamps: Column
+    spans: Column
+    queues: Column
+    widest: int
+    """The span of the widest, 0 where there is none."""
     is_exact: bool = False
     is_alone: bool = False
     is_at_ticks: bool = False
 
     def __len__(self) -> int:
         return len(self.spans)
-
-    @property
-    def widest(self) -> int:
-        """The span of the widest, 0 where there is none."""
-        return int(self.spans.max(initial=0))
 
 
 def possible_sets(
@@ -82,57 +81,61 @@ def possible_sets(
     pivots, others = ordered[pivot], [each for at, each in enumerate(ordered) if at != pivot]
     is_age = config.options.distance is Distance.AGE
     successors = int(config.options.waits_for_next and config.options.max_wait is None)
-    spans, queues, are_lost, partners = _sets_around(pivots, others, successors=successors, is_age=is_age)
-    belong = spans < FAR
+    found = _sets_around(pivots, others, successors=successors, is_age=is_age)
+    first, last = pivots.stamps[0], pivots.stamps[-1]
     if is_window:
         first, last = max(each.stamps[0] for each in ordered), min(each.stamps[-1] for each in ordered)
-        belong &= (pivots.stamps[:] >= first) & (pivots.stamps[:] <= last)
+    equal = sum(int(np.count_nonzero(rows[:, _SPAN] == 0)) for rows in found.blocks())
     is_alone = len(among) == 1
-    is_exact = not is_alone and not is_age and float(np.mean(spans == 0)) >= _EQUAL
-    if is_exact:
-        belong &= spans == 0
-    elif not is_alone and not is_age:
-        belong &= ~are_lost
-        periods = [period_of(each.stamps) for each in others]
-        usual = quantile(spans[belong], 0.75) if belong.any() else 0
-        belong &= spans <= min(_PERIODS * max(periods), _FAR_OFF * usual)
-        if not config.options.repeats:
-            belong &= _disjoint(spans, partners)
-    unshifted = shifted(pivots.stamps[:], -config.topics[among[pivot]].offset_ns)
-    return PossibleSets(
-        tuple(among), among[pivot], unshifted[belong], spans[belong], queues[belong], is_exact, is_alone
-    )
+    is_exact = not is_alone and not is_age and equal / len(found) >= _EQUAL
+    are_compared = not is_alone and not is_age and not is_exact
+    limit: float = 0 if is_exact else FAR - 1
+
+    def belong(rows: Nanoseconds) -> npt.NDArray[np.bool_]:
+        those = (rows[:, _SPAN] <= limit) & (rows[:, _STAMP] >= first) & (rows[:, _STAMP] <= last)
+        return those & (rows[:, _IS_LOST] == 0) if are_compared else those
+
+    def spans() -> Iterator[Nanoseconds]:
+        return (rows[belong(rows), _SPAN] for rows in found.blocks())
+
+    if are_compared:
+        usual = quantiles(spans, [0.75])[0] if extent(spans)[0] else 0
+        limit = min(limit, _PERIODS * max(period_of(each.stamps) for each in others), _FAR_OFF * usual)
+    kept, widest, offset = Rows(3), 0, config.topics[among[pivot]].offset_ns
+    for rows in _mutual(found) if are_compared and not config.options.repeats else found.blocks():
+        some = rows[belong(rows), : _QUEUE + 1]
+        widest = max(widest, int(some[:, _SPAN].max(initial=0)))
+        some[:, _STAMP] = shifted(some[:, _STAMP], -offset)
+        kept.append(some)
+    stamps, of_spans, queues = map(kept.column, range(kept.width))
+    return PossibleSets(tuple(among), among[pivot], stamps, of_spans, queues, widest, is_exact, is_alone)
 
 
-def _sets_around(
-    pivots: InOrder, others: Sequence[InOrder], *, successors: int, is_age: bool
-) -> tuple[Nanoseconds, Nanoseconds, npt.NDArray[np.bool_], list[Nanoseconds]]:
-    """Return of the tightest set of each pivot its span, the fullest queue, if a partner was lost, and the partners."""
-    spans, queues = np.zeros((2, len(pivots.stamps)), dtype=np.int64)
-    partners = [np.zeros(len(spans), dtype=np.int64) for _ in others]
-    are_lost = np.zeros(len(spans), dtype=np.bool_)
+def _sets_around(pivots: InOrder, others: Sequence[InOrder], *, successors: int, is_age: bool) -> Rows:
+    """Return the rows of all pivots."""
+    rows = Rows(_PARTNERS + len(others))
     steady = [_steady_period(each.stamps) for each in others]
-    for begin in range(0, len(spans), BLOCK):
-        some = slice(begin, begin + BLOCK)
-        stamps = pivots.stamps[some]
+    for begin in range(0, len(pivots.stamps), BLOCK):
+        stamps = pivots.stamps[begin : begin + BLOCK]
         near = [_near(each, stamps) for each in others]
         found = [sides(stamps, each.stamps[:]) for each, _ in near]
-        spans[some], left = _ages(len(stamps), found) if is_age else tightest_spans(len(stamps), found)
+        spans, left = _ages(len(stamps), found) if is_age else tightest_spans(len(stamps), found)
         chosen = [
             np.clip(np.where((each.before <= left) & (each.after != 0), each.at - 1, each.at), 0, len(other.stamps) - 1)
             for each, (other, _) in zip(found, near, strict=True)
         ]
         own = _near(pivots, stamps)
         at_own = np.arange(len(stamps)) + begin - own[1]
-        queues[some] = _queues(
+        queues = _queues(
             [(own[0], at_own), *((each, at) for (each, _), at in zip(near, chosen, strict=True))],
             successors=successors,
         )
-        for row, at, (_, first) in zip(partners, chosen, near, strict=True):
-            row[some] = at + first
+        partners = [at + first for at, (_, first) in zip(chosen, near, strict=True)]
+        are_lost = np.zeros(len(stamps), dtype=np.bool_)
         for each, period in zip(found, steady, strict=True):
-            are_lost[some] |= _is_lost(each, period)
-    return spans, queues, are_lost, partners
+            are_lost |= _is_lost(each, period)
+        rows.append(np.stack([stamps, spans, queues, are_lost, *partners], axis=1))
+    return rows
 
 
 def _near(messages: InOrder, stamps: Nanoseconds) -> tuple[InOrder, int]:
@@ -163,7 +166,8 @@ def _sets_at_ticks(
         oldest = np.maximum(oldest, _ages_at(at, inputs[index], config.topics[index].offset_ns, wait))
     belong = oldest < FAR
     queues, pivot = np.ones(len(at), dtype=np.int64), min(among, key=lambda index: len(inputs[index].stamps))
-    return PossibleSets(tuple(among), pivot, at[belong], oldest[belong], queues[belong], is_at_ticks=True)
+    widest = int(oldest[belong].max(initial=0))
+    return PossibleSets(tuple(among), pivot, at[belong], oldest[belong], queues[belong], widest, is_at_ticks=True)
 
 
 def _ages_at(ticks: Nanoseconds, messages: Received, offset: int, max_wait: int) -> Nanoseconds:
@@ -215,16 +219,37 @@ def _is_lost(found: Sides, period: float) -> npt.NDArray[np.bool_]:
     return (gap > _PERIODS * period) & (np.minimum(found.before, found.after) > _NOT_NEAREST * period)
 
 
-def _disjoint(spans: Nanoseconds, partners: Sequence[Nanoseconds]) -> npt.NDArray[np.bool_]:
-    """Tell which sets share no message with a tighter one: only these are nearest to each other mutually."""
-    order = np.argsort(spans, kind="stable")
-    taken = [bytearray(int(each.max(initial=-1)) + 1) for each in partners]
-    free = np.zeros(len(spans), dtype=np.bool_)
-    for some in blocks(order):
-        rows = np.stack([each[some] for each in partners], axis=1).tolist()
-        for place, row in zip(some.tolist(), rows, strict=True):
-            if not any(used[each] for each, used in zip(row, taken, strict=True)):
-                free[place] = True
-                for each, used in zip(row, taken, strict=True):
-                    used[each] = True
-    return free
+def _mutual(found: Rows) -> Iterator[Nanoseconds]:
+    """Yield those sets that share no message with a tighter one: only these are nearest to each other mutually."""
+    for rows in _apart(found):
+        are_shared = np.zeros(len(rows), dtype=np.bool_)
+        for each in rows[:, _PARTNERS:].T:
+            _, which, counts = np.unique(each, return_inverse=True, return_counts=True)
+            are_shared |= counts[which] > 1
+        free, taken = ~are_shared, [set[int]() for _ in range(_PARTNERS, found.width)]
+        order = np.flatnonzero(are_shared)
+        for places in blocks(order[np.argsort(rows[order, _SPAN], kind="stable")]):
+            for place, partners in zip(places.tolist(), rows[places, _PARTNERS:].tolist(), strict=True):
+                if not any(each in used for each, used in zip(partners, taken, strict=True)):
+                    free[place] = True
+                    for each, used in zip(partners, taken, strict=True):
+                        used.add(each)
+        yield rows[free]
+
+
+def _apart(found: Rows) -> Iterator[Nanoseconds]:
+    """Yield rows in order, many at a time; none shares a partner with one that is yielded at another time."""
+    held, most = list[Nanoseconds](), np.full(found.width - _PARTNERS, -1)
+    for rows in found.blocks():
+        partners = rows[:, _PARTNERS:]
+        before = np.maximum.accumulate(np.maximum(partners, most))
+        # A partner is one of the two around a stamp, so it is at most one before that of an earlier stamp.
+        behind = np.concatenate([partners[1:], partners[-1:] - 1])
+        to_come = np.minimum.accumulate(behind[::-1])[::-1]
+        ends = np.flatnonzero((before < to_come).all(axis=1))
+        end, most = int(ends[-1]) + 1 if len(ends) else 0, before[-1]
+        if end:
+            yield np.concatenate([*held, rows[:end]])
+            held = []
+        held.append(rows[end:])
+    yield np.concatenate(held)

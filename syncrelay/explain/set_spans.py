@@ -1,6 +1,7 @@
 """Which of the sets that an engine gives are sets of one moment, as columns: many are looked at together."""
 
 from array import array
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final, NamedTuple
 
@@ -11,18 +12,18 @@ from syncrelay.config import GroupConfig
 from syncrelay.explain.dry_run import EngineDriver
 from syncrelay.explain.nearest import Nanoseconds, extents
 from syncrelay.explain.possible_sets import PossibleSets
-from syncrelay.explain.rows import BLOCK
+from syncrelay.explain.rows import BLOCK, Column, blocks, no_numbers
 from syncrelay.sync import Match, Message, Outcome
 
 
 class Run(NamedTuple):
     """The sets of one moment that a run of the engine gave: the spans that were possible, and those that they had."""
 
-    possible: Nanoseconds
-    given: Nanoseconds
+    possible: Column
+    given: Column
 
 
-NOTHING: Final = Run(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
+NOTHING: Final = Run(no_numbers(), no_numbers())
 
 
 def match(config: GroupConfig, messages: Iterable[Message], count: Callable[[Nanoseconds], None]) -> None:
@@ -45,15 +46,25 @@ def match(config: GroupConfig, messages: Iterable[Message], count: Callable[[Nan
     give()
 
 
-def of_one_moment(possible: PossibleSets, config: GroupConfig, sets: Nanoseconds) -> Run:
-    """Return the spans of those sets that are of one moment."""
+def of_one_moment(possible: PossibleSets, config: GroupConfig, sets: Nanoseconds) -> Nanoseconds:
+    """Return those sets that are of one moment, a row each: the span that was possible, and the one that it has."""
     among = list(possible.among)
     begins, ends = extents(sets[:, among], [config.topics[index].offset_ns for index in among])
     pivots = sets[:, len(config.topics) if possible.is_at_ticks else possible.pivot]
     if config.ticks is not None:
         ends = sets[:, len(config.topics)]
-    at = np.searchsorted(possible.stamps, pivots, side="right") - 1
-    belong = (at >= 0) & (sets[:, among] != UNREADABLE).all(axis=1)
-    belong[belong] = possible.stamps[at[belong]] == pivots[belong]
-    belong &= ends - begins <= possible.widest
-    return Run(possible.spans[at[belong]], (ends - begins)[belong])
+    belong = (sets[:, among] != UNREADABLE).all(axis=1) & (ends - begins <= possible.widest)
+    pivots, spans = pivots[belong], (ends - begins)[belong]
+    first = bisect_left(possible.stamps, int(pivots.min())) if len(pivots) else 0
+    around = slice(first, bisect_right(possible.stamps, int(pivots.max())) if len(pivots) else 0)
+    stamps, at = possible.stamps[around], np.searchsorted(possible.stamps[around], pivots, side="right") - 1
+    are_known = at >= 0
+    are_known[are_known] = stamps[at[are_known]] == pivots[are_known]
+    return np.stack([possible.spans[around][at[are_known]], spans[are_known]], axis=1)
+
+
+def counted(spans: Column, within: int | None) -> int:
+    """Return how many spans there are; of those `within` one, where it is given."""
+    if within is None:
+        return len(spans)
+    return sum(int(np.count_nonzero(some <= within)) for some in blocks(spans))

@@ -31,8 +31,8 @@ from syncrelay.explain.nearest import (
     signed_distances,
 )
 from syncrelay.explain.possible_sets import PossibleSets, possible_sets
-from syncrelay.explain.rows import Column, Stretches, extent, median, quantiles
-from syncrelay.explain.set_spans import NOTHING, Run, match, of_one_moment
+from syncrelay.explain.rows import Column, Rows, Stretches, extent, median, no_numbers, quantiles
+from syncrelay.explain.set_spans import NOTHING, Run, counted, match, of_one_moment
 from syncrelay.explain.widths import are_amid, tolerances, wander, with_headroom
 from syncrelay.sync import Message
 from syncrelay.sync.queues import LONGEST_QUEUE
@@ -133,15 +133,15 @@ class Trials:
             self._targets[target] = possible_sets(self.config, self.inputs, among, is_window=self.is_window)
         return self._targets[target]
 
-    def spans(self, target: int | None = REQUIRED) -> Nanoseconds:
+    def spans(self, target: int | None = REQUIRED) -> Column:
         """Return the spans of the possible sets."""
         possible = self.possible(target)
-        return np.zeros(0, dtype=np.int64) if possible is None else possible.spans
+        return no_numbers() if possible is None else possible.spans
 
     def given(self, changes: Changes, target: int | None = REQUIRED, *, within: int | None = None) -> int:
         """Return how many of the possible sets come together with changes; of those `within` a span, where one is."""
         run = self._run(changes).get(self._target(target), NOTHING)
-        return len(run.given) if within is None else int(np.count_nonzero(run.possible <= within))
+        return counted(run.possible, within)
 
     def is_enough(self, changes: Changes, target: int | None = REQUIRED, *, within: int | None = None) -> bool:
         """Tell whether changes give nearly all possible sets."""
@@ -150,8 +150,7 @@ class Trials:
         return possible >= _FEWEST and self.given(changes, target, within=within) >= possible - left_out
 
     def _count(self, target: int | None, within: int | None) -> int:
-        spans = self.spans(target)
-        return len(spans) if within is None else int(np.count_nonzero(spans <= within))
+        return counted(self.spans(target), within)
 
     def _run(self, changes: Changes) -> dict[int | None, Run]:
         if changes in self._runs:
@@ -162,7 +161,8 @@ class Trials:
         possible = {
             target: each for target in (REQUIRED, *self.optional) if (each := self.possible(target)) is not None
         }
-        found: dict[int | None, list[Run]] = {target: [] for target in possible}
+        # Of a long recording, the spans of many runs would need too much memory.
+        found = {target: Rows(2, in_memory=0) for target in possible}
 
         def count(sets: Nanoseconds) -> None:
             for target, each in possible.items():
@@ -173,13 +173,10 @@ class Trials:
         else:
             for sets in self.sets():
                 count(sets)
-        self._runs[changes] = {
-            target: Run(*map(np.concatenate, zip(*runs, strict=True))) if runs else NOTHING
-            for target, runs in found.items()
-        }
+        self._runs[changes] = {target: Run(rows.column(0), rows.column(1)) for target, rows in found.items()}
         return self._runs[changes]
 
-    def spans_given(self, changes: Changes) -> Nanoseconds:
+    def spans_given(self, changes: Changes) -> Column:
         """Return the spans of the sets of one moment that come together with changes."""
         return self._run(changes).get(REQUIRED, NOTHING).given
 

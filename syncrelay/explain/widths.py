@@ -8,7 +8,7 @@ import numpy as np
 
 from syncrelay.config import Distance
 from syncrelay.explain import words
-from syncrelay.explain.nearest import Nanoseconds, period_of, quantile, signed_distances
+from syncrelay.explain.nearest import period_of, quantile, signed_distances
 from syncrelay.explain.possible_sets import PossibleSets
 from syncrelay.explain.rows import Column
 
@@ -68,12 +68,12 @@ def wander(stamps: Column, others: Column) -> Wander:
     return Wander(abs(middles[1] - middles[0]) / took, error / took)
 
 
-def with_headroom(spans: Nanoseconds) -> str:
+def with_headroom(spans: Column) -> str:
     """Return the duration, as it stands in the file, that 99 % of spans keep to, and headroom by how they scatter."""
     return words.at_least(quantile(spans, 0.99) + _headroom(spans))
 
 
-def _headroom(spans: Nanoseconds) -> int:
+def _headroom(spans: Column) -> int:
     scatter = quantile(spans, 0.99) - quantile(spans, 0.5)
     return round(scatter * (_HEADROOM + _OF_FEW / sqrt(len(spans))))
 
@@ -84,7 +84,7 @@ def are_amid(stamps: Column, others: Column) -> bool:
     return len(distances) > 0 and quantile(distances, _TIGHT) > _CLEARLY * period_of(others) > 0
 
 
-def _others_as_near(spans: Nanoseconds, periods: Sequence[float]) -> bool:
+def _others_as_near(spans: Column, periods: Sequence[float]) -> bool:
     """Whether other sets are about as near, and it matters which leave.
 
     It does not where the quick inputs run free of the slow ones: their messages lie up to half a period away, and are

@@ -115,9 +115,9 @@ def test_the_possible_sets_are_those_of_the_moments_of_which_nothing_was_lost(po
         if is_window:
             begin, end = max(min(each.values()) for each in rig.stamps), min(max(e.values()) for e in rig.stamps)
             sets = [each for each in sets if begin <= each[found.pivot] <= end]
-        assert found.stamps.tolist() == [each[found.pivot] - rig.offsets[found.pivot] for each in sets], seed
-        assert found.spans.tolist() == [max(each) - min(each) for each in sets], seed
-        assert found.queues.tolist() == [queue(rig, each) for each in sets], seed
+        assert found.stamps[:].tolist() == [each[found.pivot] - rig.offsets[found.pivot] for each in sets], seed
+        assert found.spans[:].tolist() == [max(each) - min(each) for each in sets], seed
+        assert found.queues[:].tolist() == [queue(rig, each) for each in sets], seed
         assert found.is_exact is (are_equal and rig.config.trigger is None)
 
 

@@ -85,7 +85,7 @@ def test_a_message_is_in_one_possible_set_at_most_the_tightest():
     group = group_of([Source("/slow", 1), Source("/fast", 1)], {"policy": "approximate_time", "slop": "5ms"})
     found = possible_sets(group, as_arrays(messages, 2), (0, 1), is_window=False)
     assert found is not None
-    assert ((found.stamps - BEGAN) // MS).tolist() == [at for at in sorted(slow) if at != 500]
+    assert ((found.stamps[:] - BEGAN) // MS).tolist() == [at for at in sorted(slow) if at != 500]
 
 
 def test_stamps_of_a_long_recording_are_put_in_order_whatever_their_order_was():
@@ -109,10 +109,10 @@ def test_possible_sets_are_the_same_whatever_stretches_they_are_found_in(policy,
     rng = np.random.default_rng(1)
     periods = (30, 20, 7)
     came = sorted(
-        (at * MS + int(rng.integers(5 * MS)), index, at * MS + int(rng.integers(2 * MS)))
+        (at * MS + int(rng.integers(5 * MS)), index, at * MS + int(rng.integers(20 * MS)))
         for index, period in enumerate(periods)
         for at in range(0, 6000, period)
-        if rng.random() < 0.95
+        if rng.random() < 0.7
     )
     messages = [Message(index, BEGAN + stamp, BEGAN + at) for at, index, stamp in came]
     group = group_of(
@@ -121,11 +121,12 @@ def test_possible_sets_are_the_same_whatever_stretches_they_are_found_in(policy,
     whole, by_stretches = (_possible(group, messages, monkeypatch, size) for size in (BLOCK, 7))
     assert len(whole.stamps) > 50
     for name in ("stamps", "spans", "queues"):
-        assert np.array_equal(getattr(whole, name), getattr(by_stretches, name)), name
+        assert np.array_equal(getattr(whole, name)[:], getattr(by_stretches, name)[:]), name
 
 
 def _possible(group, messages, monkeypatch, size):
-    monkeypatch.setattr("syncrelay.explain.possible_sets.BLOCK", size)
+    for name in ("possible_sets", "rows"):
+        monkeypatch.setattr(f"syncrelay.explain.{name}.BLOCK", size)
     found = possible_sets(group, as_arrays(messages, 3), (0, 1, 2), is_window=False)
     assert found is not None
     return found

@@ -151,7 +151,7 @@ def _as_change(change: TriedChange, trials: Trials) -> Change:
         if value == config.options.patient_policy:
             reason = "it waits for messages that come late"
     elif tolerance is not None and change.key == tolerance.key:
-        widest = max(int(trials.spans(each).max(initial=0)) for each in (None, *trials.optional))
+        widest = max(each.widest for each in map(trials.possible, (None, *trials.optional)) if each is not None)
         apart = words.duration(quantile(spans, 0.5)) if len(spans) else "far"
         reason = f"the nearest messages lie {apart} apart, at most {words.duration(widest)}"
         if trials.is_enough(()):
