@@ -186,9 +186,11 @@ class Senders:
     def __init__(self) -> None:
         self._publishers: dict[bytes, _Publisher] = {}
         self._gone: dict[str, tuple[int, int]] = {}
+        self._recent: tuple[Sender, ...] | None = None
 
     def observe(self, deliveries: Sequence[Deliveries], publishers: Sequence[Endpoint]) -> None:
         """Take what came of each publisher, and what the graph shows of them."""
+        self._recent = None
         alone = publishers[0].gid if len(publishers) == 1 else b""
         came = {alone if each.gid is None else each.gid: each for each in deliveries}
         came.pop(b"", None)
@@ -212,6 +214,12 @@ class Senders:
     @property
     def recent(self) -> tuple[Sender, ...]:
         """What is known of each node; several publishers of one node, as after its restart, are one."""
+        if self._recent is None:
+            # The same for all groups that use the topic.
+            self._recent = self._by_node()
+        return self._recent
+
+    def _by_node(self) -> tuple[Sender, ...]:
         found = {
             node: Sender(node, 0, 0, sent_in_all=sent, delivered_in_all=came)
             for node, (sent, came) in self._gone.items()
