@@ -88,15 +88,12 @@ class Endpoint:
         defaults = _WRITER_DEFAULTS if self.is_writer else _READER_DEFAULTS
         left = {key: value for key, value in defaults.items() if getattr(profile, key) == "system_default"}
         self.profile = replace(profile, **left)
+        self.depth: Final = _KEPT if profile.history == "keep_all" else max(1, profile.depth)
+        """How many messages its history keeps."""
         self.is_ended = False
         self.gid = next(node.participant.bus.gids).to_bytes(16)
         self.links: dict[Endpoint, Link] = {}
         """By the other end: what is connected, or about to be."""
-
-    @property
-    def depth(self) -> int:
-        """How many messages its history keeps."""
-        return _KEPT if self.profile.history == "keep_all" else max(1, self.profile.depth)
 
     def end(self) -> None:
         """End it, in order: others hear of it."""

@@ -294,8 +294,11 @@ class Promises:
 
     def _look_for_nameless(self, report: "GroupReport") -> None:
         for each in report.facts.inputs:
+            is_nameless = any(not publisher.is_named for publisher in each.graph.publishers)
+            if not is_nameless and not self._nameless:
+                continue
             place = report.facts.name, each.name
-            if all(publisher.is_named for publisher in each.graph.publishers):
+            if not is_nameless:
                 self._nameless.pop(place, None)
                 continue
             since = self._nameless.setdefault(place, self.world.now)

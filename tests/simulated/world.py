@@ -49,17 +49,21 @@ class Line(NamedTuple):
     text: str
 
 
+_STAMP: Final = struct.Struct("<iII")
+_VECTOR: Final = struct.Struct("<3d")
+
+
 def content(stamp: int, frame: str, sensor: int, number: int) -> bytes:
     """A Vector3Stamped that tells which message it is."""
     seconds, nanoseconds = divmod(stamp, SECOND)
     text = frame.encode() + b"\0"
-    head = struct.pack("<iII", seconds, nanoseconds, len(text)) + text
-    return b"\0\1\0\0" + head + bytes(-len(head) % 8) + struct.pack("<3d", sensor, number, -1.5)
+    head = _STAMP.pack(seconds, nanoseconds, len(text)) + text
+    return b"\0\1\0\0" + head + bytes(-len(head) % 8) + _VECTOR.pack(sensor, number, -1.5)
 
 
 def identity(payload: bytes) -> tuple[int, int]:
     """Which sensor's message this is, and which of its."""
-    sensor, number, _ = struct.unpack("<3d", payload[-24:])
+    sensor, number, _ = _VECTOR.unpack(payload[-24:])
     return int(sensor), int(number)
 
 
