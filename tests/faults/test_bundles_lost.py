@@ -1,6 +1,7 @@
 """Bundles over a network that loses packets, by best effort: sets that are lost are lost whole, and none is wrong."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -9,7 +10,7 @@ from tests.faults.networks import Cable, two_machines, why_not
 from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.frames import Frame
-from tests.ros.made_messages import made
+from tests.ros.made_messages import DEFINITIONS, PAIR, made
 from tests.ros.processes import wait_until
 from tests.ros.relaying import play_until_out
 from tests.ros.stage import Stage
@@ -17,8 +18,6 @@ from tests.ros.streams import BEGIN, MS
 
 pytestmark = [pytest.mark.ros, pytest.mark.faults]
 
-_SET = "made_lost/msg/Set"
-_TEXT = "uint32 number\ngeometry_msgs/Vector3Stamped left\nuint8 between\ngeometry_msgs/Vector3Stamped right\n"
 _TOPICS = {"/left": VECTOR, "/right": VECTOR}
 _SETS = chosen(short=500, long=10_000)
 _PERIOD = 4 * MS
@@ -48,7 +47,7 @@ def _frames(number: int) -> list[Frame]:
 def test_sets_are_lost_whole_and_none_is_wrong(
     stage: Stage, cable: Cable, tmp_path_factory: pytest.TempPathFactory, figures
 ):
-    messages = made(tmp_path_factory.getbasetemp().parent, {_SET: _TEXT})
+    messages = made(tmp_path_factory.getbasetemp().parent, DEFINITIONS)
     stage.environment = messages.sourced(stage.environment)
     stage.environment |= {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}
     here, there = cable.enter(cable.first), cable.enter(cable.second)
@@ -57,11 +56,11 @@ def test_sets_are_lost_whole_and_none_is_wrong(
         "policy": "exact_time",
         "queue_size": ROOMY,
         "outputs": False,
-        "bundle": {"topic": "/set", "type": _SET, "qos": qos},
+        "bundle": {"topic": "/set", "type": PAIR, "qos": qos},
         "topics": inputs(_TOPICS, qos=LOSSLESS),
     }
     stage.relay(config({"front": group}), before=here)
-    collector = stage.collector({"/set": _SET}, reliability="best_effort", before=there)
+    collector = stage.collector({"/set": PAIR}, reliability="best_effort", before=there)
     player = stage.player(_TOPICS, before=here)
     numbers = iter(range(1, 1000))
     play_until_out(player, collector, (_frames(number) for number in numbers), ["/set"])
@@ -80,12 +79,10 @@ def test_sets_are_lost_whole_and_none_is_wrong(
     found = [(_number(messages, each), each) for each in collector.payloads("/set")]
     came = [(number, payload) for number, payload in found if first <= number < first + _SETS]
     for number, payload in came:
-        whole = messages.decode(payload, _SET)
+        whole = messages.decode(payload, PAIR)
         left, right = _payloads(number)
-        expected = messages.store.types[_SET](
-            whole.number, messages.decode(left, VECTOR), 0, messages.decode(right, VECTOR)
-        )
-        assert bytes(messages.store.serialize_cdr(expected, _SET)) == payload, f"set {number}"
+        expected = replace(whole, left=messages.decode(left, VECTOR), right=messages.decode(right, VECTOR))
+        assert bytes(messages.store.serialize_cdr(expected, PAIR)) == payload, f"set {number}"
     order = [number for number, _ in came]
     assert order == sorted(set(order))
     # The large ones need all of their packets.
@@ -94,5 +91,5 @@ def test_sets_are_lost_whole_and_none_is_wrong(
 
 
 def _number(messages, payload: bytes) -> int:
-    stamp = messages.decode(payload, _SET).left.header.stamp
+    stamp = messages.decode(payload, PAIR).left.header.stamp
     return int((stamp.sec * 10**9 + stamp.nanosec - BEGIN) // _PERIOD)

@@ -24,6 +24,25 @@ _PACKAGE = """\
 """
 _DEPENDS = ("geometry_msgs", "sensor_msgs", "std_msgs", "builtin_interfaces")
 
+PAIR, OWN, HOLDER = "made_sets/msg/Pair", "made_own/msg/Own", "made_own/msg/Holder"
+OWN_TEXT = "std_msgs/Header header\nfloat64 value\n"
+DEFINITIONS = {
+    PAIR: """\
+bool flag true
+std_msgs/Header header
+uint32 number
+string[] missing
+builtin_interfaces/Time[] stamps
+geometry_msgs/Vector3Stamped left
+uint8 between 7
+geometry_msgs/Vector3Stamped right
+geometry_msgs/Quaternion rotation
+""",
+    OWN: OWN_TEXT,
+    HOLDER: "made_own/Own own\ngeometry_msgs/Vector3Stamped left\n",
+}
+"""What several tests use, which so is built once."""
+
 
 class MadeMessages:
     """A package that is built: where, and what decodes its messages."""

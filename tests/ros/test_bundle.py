@@ -9,7 +9,7 @@ import pytest
 from tests.ros.cdr_messages import VECTOR, stamp_of, vector
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.frames import Frame
-from tests.ros.made_messages import MadeMessages, made
+from tests.ros.made_messages import DEFINITIONS, HOLDER, OWN, OWN_TEXT, PAIR, MadeMessages, made
 from tests.ros.manifests import MANIFEST_TYPE, Told, read
 from tests.ros.processes import wait_until
 from tests.ros.relaying import play_until_out
@@ -19,32 +19,15 @@ from tests.ros.streams import BEGIN, MS
 
 pytestmark = pytest.mark.ros
 
-_PAIR = "made_sets/msg/Pair"
-_DEFINITIONS = {
-    _PAIR: """\
-bool flag true
-std_msgs/Header header
-uint32 number
-string[] missing
-builtin_interfaces/Time[] stamps
-geometry_msgs/Vector3Stamped left
-uint8 between 7
-geometry_msgs/Vector3Stamped right
-geometry_msgs/Quaternion rotation
-""",
-}
-_OWN, _HOLDER = "made_own/msg/Own", "made_own/msg/Holder"
-_OWN_TEXT = "std_msgs/Header header\nfloat64 value\n"
-_DEFINITIONS |= {_OWN: _OWN_TEXT, _HOLDER: "made_own/Own own\ngeometry_msgs/Vector3Stamped left\n"}
 _TOPICS = {"/rig/left": VECTOR, "/rig/right": VECTOR}
-_BUNDLE = {"topic": "/front/set", "type": _PAIR}
+_BUNDLE = {"topic": "/front/set", "type": PAIR}
 _PERIOD = 100 * MS
 _MANIFEST = "/syncrelay/front/sets"
 
 
 @pytest.fixture(scope="session")
 def pair(tmp_path_factory: pytest.TempPathFactory) -> MadeMessages:
-    return made(tmp_path_factory.getbasetemp().parent, _DEFINITIONS)
+    return made(tmp_path_factory.getbasetemp().parent, DEFINITIONS)
 
 
 @pytest.fixture
@@ -85,7 +68,7 @@ def _connected(stage: Stage, collector: Collector, *topics: str) -> tuple[Any, i
 
 def _require_whole(pair: MadeMessages, payload: bytes, *, restamped: bool = False) -> int:
     """Check all of a bundle; its number among those that were played."""
-    found = pair.decode(payload, _PAIR)
+    found = pair.decode(payload, PAIR)
     stamp = found.left.header.stamp
     played = (stamp.sec * 10**9 + stamp.nanosec - BEGIN - (3 * MS if restamped else 0)) // _PERIOD
     sent = {frame.topic: frame.payload for frame in _frames(played)}
@@ -109,7 +92,7 @@ def _require_whole(pair: MadeMessages, payload: bytes, *, restamped: bool = Fals
 @both_backends
 def test_each_set_leaves_as_one_message_with_all_that_is_said_of_it(sourced: Stage, pair: MadeMessages):
     sourced.relay(config({"front": _group(outputs=False)}))
-    collector = sourced.collector({"/front/set": _PAIR, _MANIFEST: MANIFEST_TYPE})
+    collector = sourced.collector({"/front/set": PAIR, _MANIFEST: MANIFEST_TYPE})
     player, first = _connected(sourced, collector, "/front/set", _MANIFEST)
     before = collector.count("/front/set")
     frames = [frame for number in range(first, first + 301) for frame in _frames(number)]
@@ -117,7 +100,7 @@ def test_each_set_leaves_as_one_message_with_all_that_is_said_of_it(sourced: Sta
     payloads = collector.wait_for("/front/set", before + 300)
     played = [_require_whole(pair, payload) for payload in payloads]
     assert played[before : before + 300] == list(range(first, first + 300))
-    numbers = [pair.decode(payload, _PAIR).number for payload in payloads]
+    numbers = [pair.decode(payload, PAIR).number for payload in payloads]
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
     assert collector.endpoints("/front/rig/left", kind="publisher") == []
     collector.process.wait_until(lambda: _last_told(collector).number >= numbers[-1], "the last manifest")
@@ -133,7 +116,7 @@ def _last_told(collector: Collector) -> Told:
 @both_backends
 def test_a_common_stamp_is_in_the_members_too_and_outputs_are_left_as_they_were(sourced: Stage, pair: MadeMessages):
     relay = sourced.relay(config({"front": _group(restamp="latest")}, metrics=ANY_PORT))
-    topics = {"/front/set": _PAIR, "/front/rig/left": VECTOR}
+    topics = {"/front/set": PAIR, "/front/rig/left": VECTOR}
     collector = sourced.collector({**topics, _MANIFEST: MANIFEST_TYPE})
     player, first = _connected(sourced, collector, *topics, _MANIFEST)
     before = [collector.count(topic) for topic in topics]
@@ -141,7 +124,7 @@ def test_a_common_stamp_is_in_the_members_too_and_outputs_are_left_as_they_were(
     bundles, lefts = (
         collector.wait_for(topic, had + 30)[had : had + 30] for topic, had in zip(topics, before, strict=True)
     )
-    last = pair.decode(collector.payloads("/front/set")[-1], _PAIR).number
+    last = pair.decode(collector.payloads("/front/set")[-1], PAIR).number
     collector.process.wait_until(lambda: _last_told(collector).number >= last, "the last manifest")
     told = _last_told(collector)
     # The first sets may have left before the bundle's publisher was there.
@@ -155,7 +138,7 @@ def test_a_common_stamp_is_in_the_members_too_and_outputs_are_left_as_they_were(
     relay.wait_for_log("/rig/right -> /front/rig/right, whole sets -> /front/set")
     for number, bundle, left in zip(range(first, first + 30), bundles, lefts, strict=True):
         latest = max(stamp_of(frame.payload) for frame in _frames(number))
-        found = pair.decode(bundle, _PAIR)
+        found = pair.decode(bundle, PAIR)
         stamps = [found.header.stamp, found.left.header.stamp]
         stamps += [] if _is_missing(number) else [found.right.header.stamp]
         assert {stamp.sec * 10**9 + stamp.nanosec for stamp in stamps} == {latest}
@@ -168,18 +151,18 @@ def test_a_common_stamp_is_in_the_members_too_and_outputs_are_left_as_they_were(
 def test_messages_of_another_definition_than_the_bundles_are_refused_with_both(
     stage: Stage, pair: MadeMessages, tmp_path_factory: pytest.TempPathFactory
 ):
-    theirs = made(tmp_path_factory.getbasetemp().parent, {_OWN: f"{_OWN_TEXT}uint8 more\n"})
+    theirs = made(tmp_path_factory.getbasetemp().parent, {OWN: f"{OWN_TEXT}uint8 more\n"})
     plain = stage.environment
     stage.environment = theirs.sourced(plain)
-    player = stage.player({"/own": _OWN, "/rig/left": VECTOR}, node="camera")
+    player = stage.player({"/own": OWN, "/rig/left": VECTOR}, node="camera")
     stage.environment = pair.sourced(plain)
     group = {
         "policy": "approximate_time",
         "slop": "20ms",
-        "bundle": {"topic": "/set", "type": _HOLDER},
-        "topics": inputs({"/own": _OWN, "/rig/left": VECTOR}),
+        "bundle": {"topic": "/set", "type": HOLDER},
+        "topics": inputs({"/own": OWN, "/rig/left": VECTOR}),
     }
     relay = stage.relay(config({"front": group}, metrics=ANY_PORT))
     player.is_up()
-    found = wait_for_finding(relay, "no_bundle", naming=["/camera publishes /own", _HOLDER, ", here RIHS01_"])
+    found = wait_for_finding(relay, "no_bundle", naming=["/camera publishes /own", HOLDER, ", here RIHS01_"])
     assert len(set(re.findall(r"RIHS01_[0-9a-f]{64}", found["text"]))) == 2
