@@ -74,9 +74,11 @@ class Limited:
 
     __slots__ = (
         "_arrivals",
+        "_has_changed",
         "_max_wait",
         "_now",
         "_offsets",
+        "_oldest_since",
         "_places",
         "_policy",
         "_since",
@@ -103,11 +105,15 @@ class Limited:
         self._max_wait = max_wait_ns
         self._now = 0
         self._since: deque[int] = deque()
+        # The stage's, as long as it has not changed: it takes long to find, and is asked for at every turn.
+        self._oldest_since: int | None = None
+        self._has_changed = True
         self._waits_started = self._waits_ended = 0
 
     def feed(self, index: int, stamp: int, message: Message) -> Sequence[Outcome]:
         place = self._places.get(index)
         if place is None:
+            self._has_changed = True
             outcomes = self._stage.put(index, stamp, message, self._now)
         else:
             outcomes = self._join(self._policy.feed(place, stamp, message), self._now)
@@ -117,18 +123,22 @@ class Limited:
         if now < self._now:
             self._since = deque(min(since, now) for since in self._since)
             self._stage.wait_from(now)
+            self._has_changed = True
         self._now = now
         outcomes: list[Outcome] = []
         while (deadline := self.next_deadline()) is not None and deadline <= now:
-            if self._stage.oldest_since is not None:
+            if self._oldest_since is not None:
                 outcomes += self._stage.leave()
+                self._has_changed = True
             else:
                 outcomes += self._join(self._policy.release_oldest(), now)
         return outcomes
 
     def next_deadline(self) -> int | None:
         # The sets in the stage left the policy before anything that still waits in it, and began to wait no later.
-        since = self._stage.oldest_since
+        if self._has_changed:
+            self._oldest_since, self._has_changed = self._stage.oldest_since, False
+        since = self._oldest_since
         if since is None and self._since:
             since = self._since[0]
         return None if since is None else since + self._max_wait
@@ -138,11 +148,13 @@ class Limited:
 
     def flush(self, reason: DropReason) -> list[Drop]:
         drops = self._policy.flush(reason) + self._stage.flush(reason)
+        self._has_changed = True
         self._note_waits(self._now)
         return drops
 
     def let_go(self, reason: DropReason) -> list[Drop]:
         drops = self._policy.let_go(reason) + self._stage.let_go(reason)
+        self._has_changed = True
         self._note_waits(self._now)
         return drops
 
@@ -165,6 +177,7 @@ class Limited:
             # Sets may wait in the stage. A message that is older than theirs is late already.
             self._arrivals.give(outcome.messages)
             joined += self._stage.hold(self._widened(outcome, since))
+            self._has_changed = True
             since = now
         return joined
 
