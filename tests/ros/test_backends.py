@@ -2,9 +2,11 @@
 
 import random
 import threading
+import time
 from collections.abc import Iterator
 from itertools import count, pairwise
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -177,6 +179,22 @@ def test_messages_of_several_topics_are_delivered_by_their_time_of_receipt(here)
     while len(came) < 2000:
         inbox.deliver_all()
     assert came == sorted(came)
+    inbox.close()
+
+
+def test_each_source_tells_how_long_its_messages_waited(here):
+    came: list[Any] = []
+    looked, inbox = 0, here.backend.inbox()
+    sources = [here.backend.source(topic.subscription, came.append) for topic in here.topics[:2]]
+    for source in sources:
+        inbox.add(source)
+    here.topics[0].publisher.publish(vector(BEGIN))
+    time.sleep(0.1)
+    while not came:
+        looked = time.time_ns()
+        inbox.receive_once(_SECOND)
+    assert sources[0].waited >= looked - came[0].received
+    assert sources[0].waited > 0 == sources[1].waited
     inbox.close()
 
 
