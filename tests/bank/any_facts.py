@@ -7,6 +7,7 @@ import random
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass, replace
+from functools import partial
 from typing import Any, Final, TypeAlias
 
 from syncrelay.config import Tolerance
@@ -119,21 +120,28 @@ def at_limits(chance: random.Random) -> Iterator[tuple[str, str]]:
     before = chance.choice([None, facts, _some_changed(facts, chance)])
     facts = _goes_on(facts, chance.choice([0, S, 5 * S, 20 * S]))
     for _ in range(_DIALS):
-        dial = _dial(facts, chance)
-        if dial is None:
-            continue
-        turned, low, high = dial
-        said = _all_said(before, turned(low))
-        kind = _without_figures(said)
-        if kind == _without_figures(_all_said(before, turned(high))):
-            continue
-        while (middle := (low + high) / 2 if isinstance(low + high, float) else (low + high) // 2) not in (low, high):
-            if _without_figures(_all_said(before, turned(middle))) == kind:
-                low = middle
-            else:
-                high = middle
-        yield from (("", f"{each} {_all_said(before, turned(each))}") for each in (low, high))
-        yield from ((code, "") for code in _CODE.findall(said))
+        if (dial := _dial(facts, chance)) is not None:
+            turned, low, high = dial
+            said = around_a_limit(partial(_said_with, before, turned), low, high)
+            yield from (("", each) for each in said)
+            yield from ((code, "") for code in _CODE.findall("".join(said[:1])))
+
+
+def around_a_limit(said: Callable[[Any], str], low: Any, high: Any) -> list[str]:
+    """Return what is said of two numbers next to each other, between which the words change; nothing if they do not."""
+    words = _without_figures(said(low))
+    if words == _without_figures(said(high)):
+        return []
+    while (middle := (low + high) / 2 if isinstance(low + high, float) else (low + high) // 2) not in (low, high):
+        if _without_figures(said(middle)) == words:
+            low = middle
+        else:
+            high = middle
+    return [f"{each} {said(each)}" for each in (low, high)]
+
+
+def _said_with(before: GroupFacts | None, turned: Callable[[Any], GroupFacts], number: Any) -> str:
+    return _all_said(before, turned(number))
 
 
 def _all_said(before: GroupFacts | None, facts: GroupFacts) -> str:

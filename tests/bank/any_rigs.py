@@ -5,20 +5,29 @@ with a limit is often equal to it. What is suggested is tried on the last messag
 """
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import fields
+from functools import partial
 from typing import Any, Final
 
 from syncrelay.config import ConfigError, GroupConfig
 from syncrelay.explain import Finding, GroupFacts
 from syncrelay.explain.finding_log import Remark
+from syncrelay.explain.input_observation import InputObservation
 from syncrelay.explain.nearest import as_arrays
 from syncrelay.explain.trials import Trials
 from syncrelay.sync import Message
+from tests.bank.any_facts import around_a_limit
 from tests.explain.scenario import BEGAN, MS, S, Source, group_of, run
 
 Hears = Callable[[float, GroupFacts, tuple[Finding, ...], list[Remark]], None]
 Came = list[tuple[float, int | None]]
 
+# Of an input alone so many seconds are observed, with so many of its messages moved.
+_OBSERVED_S: Final = 20
+_MOVES: Final = 3
+# The messages themselves.
+_MANY: Final = frozenset({"stamps", "received", "delays", "nearest"})
 # By how much stamps are off: little, by some periods, or as those of another clock are.
 _OFF: Final = (
     *([n * MS for n in (3, -12, 20, 45, -60)],) * 2,
@@ -28,11 +37,15 @@ _OFF: Final = (
 _RATES: Final = (0.5, 0.999, 1.0004, 1.001, 1.25, 2)
 _KEYS: Final[tuple[dict[str, Any], ...]] = (
     *({"slop": each} for each in ("1ms", "5ms", "20ms", "20ms", "50ms", "100ms", "400ms", "3s")),
+    {},
+    {"policy": "approximate_epsilon_time", "slop": "20ms"},
     {"policy": "approximate_time_eager", "slop": "20ms"},
     {"policy": "approximate_time_eager", "slop": "150ms"},
     {"policy": "exact_time"},
+    {"policy": "latest_time", "trigger": "/t0"},
     {"policy": "latest_time", "trigger": "/t0", "max_age": "100ms"},
     {"policy": "latest_time", "trigger": "/t1", "max_age": "2s"},
+    {"policy": "latest_time", "trigger": "5 Hz"},
     {"policy": "latest_time", "trigger": "5 Hz", "max_age": "300ms", "max_wait": "60ms"},
     {"policy": "latest_time", "trigger": "200 Hz", "max_age": "90ms", "max_wait": "20ms"},
 )
@@ -91,6 +104,30 @@ def played(chance: random.Random, hears: Hears) -> None:
         whole=chance.choice([None, None, lambda: _whole(group, sources)]),
         **chance.choice(_BESIDE),
     )
+
+
+def observed(chance: random.Random) -> Iterator[tuple[str, str]]:
+    """Yield what is observed of one input, where that becomes another as some of its stamps or arrivals are moved."""
+    came = [(stamp, BEGAN + round(at * S)) for at, stamp in _came(chance) if stamp is not None and at < _OBSERVED_S]
+    for _ in range(_MOVES):
+        first, after = sorted(chance.sample(range(len(came) + 1), 2)) if came else (0, 0)
+        after = chance.choice([first + 1, after, len(came)])
+        seen = partial(_observed, came, slice(first, after), chance.choice([(1, 0), (0, 1)]))
+        high = chance.choice([-1, 1]) * chance.choice([20 * MS, 150 * MS, S, 7 * S, 20 * S, 90_000 * S])
+        yield from (("changes", each) for each in around_a_limit(seen, 0, high))
+
+
+def _observed(came: list[tuple[int, int]], some: slice, moves: tuple[int, int], by: int) -> str:
+    """Return what an input's figures are at each second, with some of its stamps or times of receipt moved."""
+    moved = [(stamp + moves[0] * by, at + moves[1] * by) for stamp, at in came[some]]
+    came = sorted([*came[: some.start], *moved, *came[some.stop :]], key=lambda each: each[1])
+    input_seen, figures = InputObservation(), list[str]()
+    for now in range(BEGAN + S, BEGAN + (_OBSERVED_S + 3) * S, S):
+        input_seen.add([each for each in came if now - S < each[1] <= now])
+        fed = sum(now - 10 * S < received <= now for _, received in came)
+        seen = input_seen.figures(fed=fed, dropped={}, seconds=min(10.0, (now - BEGAN) / S), now=now)
+        figures.append(str([getattr(seen, each.name) for each in fields(seen) if each.name not in _MANY]))
+    return "\n".join([*figures, str(input_seen.pace)])
 
 
 def _source(topic: str, chance: random.Random) -> Source:

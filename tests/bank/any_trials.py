@@ -42,7 +42,8 @@ def any_trials(chance: random.Random) -> tuple[GroupConfig, list[Came]]:
     }
     wide = chance.choice(["1ms", "10ms", "80ms", "500ms", "9000000000s"])
     if policy == "latest_time":
-        group |= {"trigger": "20 Hz", "queue_size": 10, "max_wait": "100ms", "max_age": wide}
+        group |= {"trigger": chance.choice(["20 Hz", "/t0"]), "queue_size": 10, "max_wait": "100ms"}
+        group |= chance.choice([{}, {"max_age": wide}, {"max_age": wide}])
     elif policy != "exact_time":
         group["slop"] = wide
     if chance.random() < 0.3:

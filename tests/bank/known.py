@@ -20,7 +20,7 @@ from syncrelay.explain.troubles import troubles
 from syncrelay.status.state import group_of
 from tests.bank.any_arrivals import judged
 from tests.bank.any_facts import at_limits, said_of
-from tests.bank.any_rigs import played
+from tests.bank.any_rigs import observed, played
 from tests.bank.any_trials import answers
 from tests.bank.kinds import KINDS
 from tests.bank.play import Drawn, drawn, publishers_of
@@ -183,7 +183,14 @@ def _played(chance: random.Random) -> Iterator[tuple[str, str]]:
     yield from said
 
 
-_WITHOUT_A_RIG: Final = {"facts": said_of, "limits": at_limits, "trials": answers, "arrivals": _seen, "rigs": _played}
+_WITHOUT_A_RIG: Final = {
+    "facts": said_of,
+    "limits": at_limits,
+    "trials": answers,
+    "arrivals": _seen,
+    "observed": observed,
+    "rigs": _played,
+}
 
 
 def _plain(value: Any) -> Any:
