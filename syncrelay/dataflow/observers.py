@@ -86,19 +86,19 @@ class Losses:
         self._totals: deque[int] = deque(maxlen=_RECENT)
         self.total = 0
         """How many were lost since the relay started."""
-        self._publishers: frozenset[bytes] = frozenset()
+        self._links: frozenset[Hashable] = frozenset()
         self._settling = 0
 
-    def observe(self, total: int, *, publishers: frozenset[bytes]) -> None:
-        """Take the total lost since the subscription was made, and the gids of the publishers that there are."""
-        if publishers - self._publishers or (self._totals and total < self._totals[-1]):
+    def observe(self, total: int, *, links: frozenset[Hashable]) -> None:
+        """Take the total lost since the subscription was made; `links` are it with each publisher that there is."""
+        if links - self._links or (self._totals and total < self._totals[-1]):
             self._settling = _SETTLING
         if self._settling:
             self._settling -= 1
             self._totals.clear()
         elif self._totals:
             self.total += total - self._totals[-1]
-        self._publishers = publishers
+        self._links = links
         self._totals.append(total)
 
     @property

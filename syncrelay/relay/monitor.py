@@ -171,7 +171,7 @@ class Monitor:
         for topic, losses in self._losses.items():
             # A new subscription discovers its publishers anew.
             publishers = topic.publishers if topic.entity is not None else ()
-            losses.observe(topic.lost(), publishers=frozenset(each.gid for each in publishers))
+            losses.observe(topic.lost(), links=frozenset((topic.entity, each.gid) for each in publishers))
         self._empty_graph = self._surroundings.empty_graph()
         if self._discovery.goes_on(self._runtime.monotonic()):
             self._discovery.observe(self._surroundings.nodes_and_topics(), now=self._runtime.monotonic())

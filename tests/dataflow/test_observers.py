@@ -68,7 +68,7 @@ def test_only_what_a_known_publisher_lost_of_late_is_a_loss(totals_and_publisher
     losses = Losses()
     assert losses.recent == 0
     for total, publishers in totals_and_publishers:
-        losses.observe(total, publishers=frozenset(map(str.encode, publishers)))
+        losses.observe(total, links=frozenset(publishers))
     assert (losses.recent, losses.total) == (recent, in_all)
 
 
