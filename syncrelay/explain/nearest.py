@@ -2,6 +2,7 @@
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import accumulate
 from operator import itemgetter
 from typing import Final, NamedTuple, TypeAlias
@@ -28,12 +29,15 @@ LONGEST: Final = _LATEST
 """No offset or wait longer than this, 146 years, is tried: as a duration of the file it might be out of range."""
 
 
-class Received(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Received:
     """One input's messages as they arrived: stamps, times of receipt, and their places among those of all inputs."""
 
     stamps: Column
     received: Column
     places: Column
+    ordered: dict[int, "InOrder"] = field(default_factory=dict)
+    """What in_order gave, by the offset: all that compares inputs asks for it."""
 
     @property
     def are_stamped(self) -> npt.NDArray[np.bool_]:
@@ -42,7 +46,7 @@ class Received(NamedTuple):
 
     def stamped(self) -> Iterator[tuple[Nanoseconds, Nanoseconds, Nanoseconds]]:
         """Yield stamps, times of receipt and places of those that have a stamp, many at a time."""
-        for stamps, received, places in zip(*map(blocks, self), strict=True):
+        for stamps, received, places in zip(*map(blocks, (self.stamps, self.received, self.places)), strict=True):
             is_set = _are_stamped(stamps)
             yield (stamps, received, places) if is_set.all() else (stamps[is_set], received[is_set], places[is_set])
 
@@ -77,6 +81,12 @@ def as_arrays(messages: Sequence[Message], n_inputs: int) -> tuple[Received, ...
 
 def in_order(messages: Received, offset: int) -> InOrder:
     """Sort an input's messages by stamp. Of messages with one stamp the last counts, as it does in the engine."""
+    if offset not in messages.ordered:
+        messages.ordered[offset] = _sorted(messages, offset)
+    return messages.ordered[offset]
+
+
+def _sorted(messages: Received, offset: int) -> InOrder:
     least = [int(stamps.min()) if len(stamps) else _NEVER for stamps, _, _ in messages.stamped()]
     # Stamps below the least that is still to come are in order once they are sorted.
     to_come = [*accumulate(reversed(least), min, initial=_NEVER)][-2::-1]

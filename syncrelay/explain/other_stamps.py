@@ -13,7 +13,7 @@ from syncrelay.explain.codes import Code
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.figures import InputFigures
 from syncrelay.explain.findings import written
-from syncrelay.explain.nearest import Nanoseconds, period_of, quantile, shifted, sides
+from syncrelay.explain.nearest import Nanoseconds, Received, period_of, quantile, shifted, sides
 from syncrelay.explain.pairing import is_certain
 from syncrelay.explain.trials import REQUIRED, UNTRIED, Trials, Tried, Verdict
 from syncrelay.explain.widths import with_headroom
@@ -241,7 +241,8 @@ def _mapped_stamps(trials: Trials, index: int) -> Nanoseconds | None:
 
 def _with_stamps(trials: Trials, index: int, stamps: Nanoseconds, changes: Changes) -> Trials:
     """Return trials of the same messages with other stamps of an input, of the group with changes."""
-    inputs = [each._replace(stamps=stamps) if at == index else each for at, each in enumerate(trials.inputs)]
+    own = Received(stamps, trials.inputs[index].received, trials.inputs[index].places)
+    inputs = [own if at == index else each for at, each in enumerate(trials.inputs)]
 
     def messages() -> Iterator[Message]:
         mapped = iter(stamps.tolist())

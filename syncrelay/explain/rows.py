@@ -20,7 +20,7 @@ BLOCK: Final = 1 << 14
 """So many rows are kept, and worked on, at a time."""
 
 # So many bytes stay in memory: most recordings need no file.
-_IN_MEMORY: Final = 4_000_000
+_IN_MEMORY: Final = 1_000_000
 _BYTES: Final = 8
 # So many numbers are sorted at once; of more, those are counted that lie in each of so many parts of their range.
 _AT_ONCE: Final = 1 << 17

@@ -94,7 +94,7 @@ class Trials:
     sets: Callable[[], Iterable[Nanoseconds]] | None = None
     """The sets that the group gives as it is, where they are known: a row a set, in which the stamps come first."""
     kept: dict[Hashable, Any] = field(default_factory=dict)
-    """What other_stamps found out of these messages."""
+    """What was found out of these messages, whatever the values of the file."""
     _targets: dict[int | None, PossibleSets | None] = field(default_factory=dict)
     _runs: dict[Changes, dict[int | None, Run]] = field(default_factory=dict)
 
@@ -315,6 +315,15 @@ class Trials:
             shifted(shifted(received, 0) - shifted(stamps, offset), 0) for stamps, received, _ in messages.stamped()
         )
 
+    def _usual_delay(self, index: int) -> int | None:
+        """Return how long after its stamp an input's message usually came; None where none has a stamp."""
+        key = ("usual delay", index, self.config.topics[index].offset_ns)
+        if key not in self.kept:
+            delays = self._delays(index)
+            self.kept[key] = quantiles(delays, [0.5])[0] if extent(delays)[0] else None
+        delay: int | None = self.kept[key]
+        return delay
+
     def verdict(self, target: int | None, keys: Collection[str], *, all_widths: bool = False) -> Verdict:
         """Return the fewest values of the plan, of these keys, that cure a target.
 
@@ -409,8 +418,8 @@ class Trials:
 
     def apart(self, index: int) -> int:
         """Return how much later after its stamp an input's message comes than the required ones' do; 0 if unknown."""
-        among = {*self._needed, index}
-        delays = {at: quantiles(each, [0.5])[0] for at in among if extent(each := self._delays(at))[0]}
+        usually = {at: self._usual_delay(at) for at in {*self._needed, index}}
+        delays = {at: delay for at, delay in usually.items() if delay is not None}
         if index not in delays or len(delays) < 2:  # noqa: PLR2004  one alone has no other clock
             return 0
         # Of two, the one that is farther from this machine's time is odd.

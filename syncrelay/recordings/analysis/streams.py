@@ -72,6 +72,8 @@ class Stream:
     transforms: RecordedTransforms | None = None
     mapped: dict[int, "Stream"] = field(default_factory=dict)
     """What by_device gave, by the delay: to map takes as long as to match."""
+    kept: dict[str, Any] = field(default_factory=dict)
+    """What was found out of its messages."""
     rows: Rows = field(default_factory=lambda: Rows(3))
     """What is read, in the columns of a stream that was `begun`."""
     _read_frame: ReadFrame = field(default_factory=frame_reader)
@@ -103,19 +105,20 @@ class Stream:
             times = host_times(clock, stamps.tolist(), at.tolist())
             mapped.append(np.fromiter(times, dtype=np.int64).reshape(-1, 1))
         mapping = Mapping(self.stamps, tuple(steps), clock.rate, delay_ns)
-        return replace(self, stamps=mapped.column(0), mapping=mapping, mapped={})
+        return replace(self, stamps=mapped.column(0), mapping=mapping, mapped={}, kept={})
 
     def by_receipt(self) -> "Stream":
         """Give the same messages with the times of receipt for stamps."""
-        return replace(self, stamps=self.received, mapping=None, mapped={})
+        return replace(self, stamps=self.received, mapping=None, mapped={}, kept={})
 
     def arrays(self) -> tuple[Nanoseconds, Nanoseconds, Nanoseconds]:
         """Give stamps, times of receipt and places as whole arrays."""
         return self.stamps[:], self.received[:], self.places[:]
 
     def as_received(self) -> Received:
-        """Give the messages as they arrived."""
-        return Received(self.stamps, self.received, self.places)
+        """Give the messages as they arrived, once all are read."""
+        received: Received = self.kept.setdefault("received", Received(self.stamps, self.received, self.places))
+        return received
 
     def add(self, column: Column, batch: Batch, begin: int) -> None:
         """Take messages of a batch, which begins at a place of the recording."""

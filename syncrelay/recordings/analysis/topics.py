@@ -60,7 +60,13 @@ class TopicFigures:
 
 
 def figures_of(stream: Stream) -> TopicFigures:
-    """Return the figures of a topic's stream."""
+    """Return the figures of a topic's stream, once all is read."""
+    figures: TopicFigures = stream.kept.get("figures") or _figures(stream)
+    stream.kept["figures"] = figures
+    return figures
+
+
+def _figures(stream: Stream) -> TopicFigures:
     stamps, received = stream.stamps, stream.received
     unstamped = sum(int(np.count_nonzero(some == 0)) for some in blocks(stamps))
     unreadable = sum(int(np.count_nonzero(some == UNREADABLE)) for some in blocks(stamps))
