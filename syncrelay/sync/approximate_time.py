@@ -167,7 +167,11 @@ class ApproximateTime(Queued):
     def lend(self, newest: Sequence[int]) -> Search | None:
         firsts = [stamps[0] if stamps else after for stamps, after in zip(self._stamps, newest, strict=True)]
         # What queues lost tells nothing of messages that come much later.
-        if self._overflowed or self._losses.reach(min(firsts) - self._slop) or max(firsts) >= LARGEST_NS:
+        if self._overflowed or self._losses.reach(min(firsts) - self._slop):
+            return None
+        # What a field gives as a stamp may be any number.
+        lasts = [stamps[-1] for stamps in self._stamps if stamps]
+        if min(firsts) <= -LARGEST_NS or max(*lasts, *newest) >= LARGEST_NS:
             return None
         candidate = None
         if self._pivot is not None:

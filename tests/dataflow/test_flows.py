@@ -11,7 +11,7 @@ from syncrelay.cdr import read_stamp
 from syncrelay.dataflow.backend import PublishError
 from syncrelay.dataflow.flow import RECENT
 from syncrelay.explain import Tape
-from syncrelay.sync import DropReason, Message, SyncGroup
+from syncrelay.sync import ApproximateTime, DropReason, Message, SyncGroup
 from tests.dataflow.payloads import FLOWS, Named, Outlet, group_of
 from tests.faults.extent import chosen
 from tests.ros.cdr_messages import VECTOR, vector
@@ -169,6 +169,17 @@ def test_the_same_leaves_of_any_engine(policy, data):
 def test_the_same_leaves_of_streams_of_any_rates(seed):
     first, second = (_at_rates(flow, Rates(seed)) for flow in FLOWS)
     assert first == second
+
+
+@pytest.mark.parametrize("far", [2**63, 2**80])
+def test_a_stamp_that_a_field_gives_may_be_any_number(far):
+    group = group_of(topics=["/a", "/b"], flow=FLOWS[-1])
+    group.engine = SyncGroup(ApproximateTime(n_inputs=2, queue_size=5, slop_ns=10))
+    group.flow.receive(0, Named(0, 0), 50)
+    assert group.counts()[0].buffered == 1
+    group.flow.receive(0, Named(1, 1), far)
+    group.flow.receive(1, Named(2, 2), 49)
+    assert group.counts()[0].buffered == 2
 
 
 def _at_rates(flow, rates):

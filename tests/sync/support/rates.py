@@ -24,7 +24,9 @@ class Rates:
             "min_periods_ns": [chance.choice((0, 0, 5 * MS, 30 * MS)) for _ in range(self.n_inputs)],
         }
         self._jitter, self._late = chance.choice((0, 0, 1, 3, 20)) * MS, chance.choice((0, 0, 2, 15, 60)) * MS
-        self._lost, self._disorder = chance.choice((0, 0, 0.02, 0.3)), chance.choice((0, 0, 0, 0.01, 0.1))
+        # What a field gives as a stamp may be any number.
+        self._begin = chance.choice((*(START,) * 8, -SECOND, 2**62 - SECOND, 2**63 - SECOND, -(2**62) - SECOND, 2**80))
+        self._lost, self._disorder = chance.choice((0, 0, 0.02, 0.3)), chance.choice((0, 0, 0.01, 0.1))
         came = sorted(each for index in range(self.n_inputs) for each in self._of_input(index))
         self.messages = [(index, stamp) for _, index, stamp in came[:400]]
 
@@ -38,13 +40,13 @@ class Rates:
     def _of_input(self, index):
         chance = self.chance
         period, grain = chance.choice((5, 10, 33, 33, 50, 100, 500)) * MS, chance.choice((1, 1, 10 * MS))
-        at, newest = START + chance.randrange(period), 0
-        while at < START + 3 * SECOND:
-            stamp = newest = max(newest + 1, round(at + chance.uniform(-self._jitter, self._jitter)) // grain * grain)
+        at, newest = self._begin + chance.randrange(period), self._begin - SECOND
+        while at < self._begin + 3 * SECOND:
+            stamp = newest = max(newest + 1, (at + round(chance.uniform(-self._jitter, self._jitter))) // grain * grain)
             if chance.random() < self._disorder:
-                stamp -= chance.choice((1, 5 * MS, 100 * MS, 2 * SECOND))
+                stamp -= chance.choice((1, 5 * MS, 100 * MS, 2 * SECOND, -(2**62), -(2**80), 2**80))
             if chance.random() >= self._lost:
-                yield at + self._late * chance.random(), index, stamp
+                yield at + round(self._late * chance.random()), index, stamp
             at += period
             if chance.random() < 0.003:
                 at += chance.randrange(2 * SECOND)
