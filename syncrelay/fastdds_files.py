@@ -38,6 +38,12 @@ def held_by(pid: int, folder: Path = FOLDER) -> set[str]:
     return {match["name"] for match in found if match}
 
 
+def ports_among(numbers: range, folder: Path = FOLDER) -> set[str]:
+    """The names of the ports that exist with these numbers, whoever has or left them."""
+    found = (NAME.fullmatch(path.name) for path in folder.glob("*port*"))
+    return {match[0] for match in found if match and match[1] and int(match[1]) in numbers}
+
+
 def remove_unused(names: Iterable[str], folder: Path = FOLDER) -> None:
     """Remove those of these segments and ports that no other process holds, each with what stands beside it.
 

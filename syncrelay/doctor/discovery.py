@@ -7,21 +7,13 @@ from typing import Final
 
 from syncrelay.config.wording import did_you_mean, quoted
 from syncrelay.doctor.diagnosis import Diagnosis, error, info
-from syncrelay.environment.domain import DISCOVERY_RANGES, DOMAIN_ADVICE, domain_of, no_domain, range_of
+from syncrelay.environment.domain import DISCOVERY_RANGES, DOMAIN_ADVICE, domain_of, no_domain, ports_of, range_of
 
-# DDS: 250 UDP ports for each domain, from 7400 on.
-_FIRST_PORT: Final = 7400
-_PORTS: Final = 250
 _LOCALHOST_ONLY: Final = "ROS_LOCALHOST_ONLY"
 _RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _PEERS: Final = "ROS_STATIC_PEERS"
 # Linux's own default.
 _EPHEMERAL: Final = (32768, 60999)
-
-
-def ports_of(domain: int) -> range:
-    """Return the UDP ports of a domain; Fast DDS numbers its ports in shared memory alike."""
-    return range(_FIRST_PORT + _PORTS * domain, _FIRST_PORT + _PORTS * (domain + 1))
 
 
 def peers_of(environ: Mapping[str, str]) -> tuple[str, ...]:

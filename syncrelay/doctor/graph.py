@@ -5,7 +5,7 @@ from typing import Final
 
 from syncrelay.config.wording import all_of
 from syncrelay.doctor.diagnosis import Diagnosis, Severity, error, info
-from syncrelay.doctor.discovery import ports_of
+from syncrelay.environment.domain import ports_of
 from syncrelay.explain import Code, Finding, GraphSnapshot, GroupReport, no_other_node
 from syncrelay.explain import Severity as Judged
 

@@ -11,7 +11,7 @@ from typing import Final
 
 from syncrelay.config.wording import counted
 from syncrelay.doctor.diagnosis import Diagnosis, error, info
-from syncrelay.doctor.discovery import ports_of
+from syncrelay.environment.domain import ports_of
 from syncrelay.fastdds_files import FOLDER, NAME, is_locked, locks_of
 
 # One participant with the default segment size of 512 kB, and its ports.

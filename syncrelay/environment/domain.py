@@ -11,6 +11,9 @@ from syncrelay.printable import printable
 DISCOVERY_RANGES: Final = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 DOMAIN_ADVICE: Final = "export ROS_DOMAIN_ID=0    or the number that the other nodes have; 0 to 101 are safe on Linux"
 _LARGEST_DOMAIN: Final = 232
+# DDS: 250 UDP ports for each domain, from 7400 on.
+_FIRST_PORT: Final = 7400
+_PORTS: Final = 250
 # rcl reads the number with it, so that here is read what rcl will read: of 010 eight, of 0x1f 31, of "7x" seven.
 _strtoul: Final = ctypes.CDLL(None).strtoul
 _strtoul.argtypes = (ctypes.c_char_p, ctypes.POINTER(ctypes.c_char_p), ctypes.c_int)
@@ -26,6 +29,11 @@ def domain_of(environ: Mapping[str, str]) -> int | None:
     number = int(_strtoul(os.fsencode(text), ctypes.byref(rest), 0))
     # What does not begin with a number is 0 with all of it left over; -1 is the largest number of all.
     return None if number > _LARGEST_DOMAIN or (number == 0 and rest.value) else number
+
+
+def ports_of(domain: int) -> range:
+    """Return the UDP ports of a domain; Fast DDS numbers its ports in shared memory alike."""
+    return range(_FIRST_PORT + _PORTS * domain, _FIRST_PORT + _PORTS * (domain + 1))
 
 
 def range_of(environ: Mapping[str, str]) -> str:

@@ -9,7 +9,8 @@ import time
 from collections.abc import Iterator, Sequence
 
 from syncrelay.cdr import patch_stamp
-from syncrelay.fastdds_files import held_by, remove_unused
+from syncrelay.environment.domain import ports_of
+from syncrelay.fastdds_files import held_by, ports_among, remove_unused
 from syncrelay.rig.processes import LEAVE_WITHIN_S, UP
 from syncrelay.rig.schedule import SENSORS, Shot, schedule
 from syncrelay.ros.environment import log_arguments
@@ -74,12 +75,14 @@ def _publish(name: str, shots: Iterator[Shot], stop: Wakeup) -> None:
         if stop.wait(max(0, shot.sent - time.time_ns()) / 1e9):
             break
         publisher.publish(patch_stamp(frames[shot.number % len(frames)], shot.stamp))
-    held = held_by(os.getpid())
-    leave(node, rclpy.utilities.get_default_context())
+    context = rclpy.utilities.get_default_context()
+    held, ports = held_by(os.getpid()), ports_of(context.get_domain_id())
+    leave(node, context)
     if is_leaving():
         os._exit(0)
-    # Of processes that leave a port at the same moment, Fast DDS may let the last one leave the file.
-    remove_unused(held)
+    # Of processes that leave a port at the same moment, Fast DDS may let the last one leave the file: it may be one
+    # that we took after we noted what we held, and that was in use as others looked.
+    remove_unused(held | ports_among(ports))
 
 
 if __name__ == "__main__":
