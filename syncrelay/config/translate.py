@@ -154,7 +154,8 @@ def _no_such_word(found: object, words: Sequence[str], loc: Location, document: 
     if close is not None:
         return f"unknown value {quoted(str(found))}{or_nearest(close)}"
     choices = [*words, _MAPPING_FORMS[str(loc[-2])]] if loc[-1] == "<name>" else words
-    return f"expected {one_of(choices)}, found {describe(found)}"
+    elsewhere = " (that of a package is known where the package is installed)" if loc[-1] == "policy" else ""
+    return f"expected {one_of(choices)}, found {describe(found)}{elsewhere}"
 
 
 def _rather(error: ErrorDetails, form: Form) -> str:
