@@ -6,7 +6,8 @@ from pathlib import Path
 from picture import COLUMNS, LINES, draw
 from rich.segment import SegmentLines
 
-from syncrelay.status import RelayState, status_of
+from syncrelay.status import RelayState
+from syncrelay.status.as_document import status_of
 from syncrelay.status.document import read_status
 from syncrelay.top.app import TopApp
 from syncrelay.top.client import Answer

@@ -119,7 +119,7 @@ def relay_rig(
 
 
 def _relay(relay: "Relay", rig: "Rig", show: Show, *, total_s: float | None, stop: StopRequest) -> "Moment":
-    from syncrelay.status import status_of
+    from syncrelay.status.as_document import status_of
     from syncrelay.top.plain import Moment
 
     began = time.monotonic()

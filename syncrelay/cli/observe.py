@@ -140,7 +140,7 @@ def _show(relay: "Relay", stop: StopRequest) -> None:
 
 
 def _answer(relay: "Relay") -> "Answer":
-    from syncrelay.status import status_of
+    from syncrelay.status.as_document import status_of
     from syncrelay.top.client import Answer
 
     return Answer("", b"", status_of(relay.state()))
@@ -148,7 +148,7 @@ def _answer(relay: "Relay") -> "Answer":
 
 def _as_json(state: "RelayState", seconds: float, analyses: "Sequence[GroupAnalysis]") -> object:
     """Return the state as /status has it, for how long was observed, and what is suggested for each group."""
-    from syncrelay.status import status_of
+    from syncrelay.status.as_document import status_of
 
     suggestions = [{"group": each.group.name, **asdict(each.suggestion)} for each in analyses]
     return {**status_of(state).as_dict(), "seconds": round(seconds, 1), "suggestions": suggestions}

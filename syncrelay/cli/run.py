@@ -139,7 +139,7 @@ def loaded(config_paths: Sequence[str], groups: Sequence[str]) -> "Config":
 
 def _status(relay: "Relay") -> str:
     # Imported when it is first asked for, which may be never.
-    from syncrelay.status import status_of
+    from syncrelay.status.as_document import status_of
     from syncrelay.top.plain import summary
 
     return summary(status_of(relay.state()))

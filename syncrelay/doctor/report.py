@@ -10,7 +10,7 @@ from syncrelay.doctor.diagnosis import Diagnosis, Severity
 from syncrelay.doctor.examine import Examination, Observed
 from syncrelay.explain import Code, GroupFacts, InputFacts, words
 from syncrelay.printable import aligned, printable
-from syncrelay.status import group_of
+from syncrelay.status.as_document import group_of
 
 _THROUGH: Final = {"compiled": "librcl in compiled code", "rclpy": "rclpy"}
 _BOLD, _RED, _YELLOW, _DIM, _RESET = "\033[1m", "\033[31m", "\033[33m", "\033[2m", "\033[0m"

@@ -6,7 +6,6 @@ send more than is here, which readers ignore; a field with a default may be miss
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum
 from functools import cache
 from typing import Annotated, Any, Final, TypeAlias
 
@@ -15,6 +14,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, Ty
 from syncrelay.errors import SyncRelayError
 from syncrelay.explain import RecentDrop, RecentSet
 from syncrelay.printable import printable
+from syncrelay.status.state import Level, Phase
 
 Text: TypeAlias = Annotated[str, AfterValidator(printable)]
 """A text that is safe to show: what answers at a port may be anything."""
@@ -27,31 +27,6 @@ Rate: TypeAlias = Annotated[float, Field(ge=0, le=1e18, allow_inf_nan=False)]
 
 # A field of 64 bits may hold a stamp, and offsets are added.
 _STAMPS: Final = range(-(1 << 80), 1 << 80)
-
-
-class Phase(Enum):
-    """Where a relay is in its life. Only managed nodes are unconfigured, inactive or finalized.
-
-    `observing` is a process that publishes nothing, for as long as it runs.
-    """
-
-    UNCONFIGURED = "unconfigured"
-    INACTIVE = "inactive"
-    STARTING = "starting"
-    OBSERVING = "observing"
-    RUNNING = "running"
-    PAUSED = "paused"
-    DRAINING = "draining"
-    FINALIZED = "finalized"
-
-
-class Level(Enum):
-    """The state of a group in DiagnosticStatus's words: STALE where nothing comes in at all."""
-
-    OK = "ok"
-    WARN = "warn"
-    ERROR = "error"
-    STALE = "stale"
 
 
 class NotAStatusError(SyncRelayError):

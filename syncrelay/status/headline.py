@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 from syncrelay.config.wording import all_of, counted
 from syncrelay.explain import Code, listed
-from syncrelay.status.document import Group, Level, Phase
+from syncrelay.status.document import Group
+from syncrelay.status.state import Level, Phase
 
 _FAILS = (Level.ERROR, Level.STALE)
 

@@ -23,7 +23,7 @@ from syncrelay.status.announcement import Place, announce
 from syncrelay.status.hosts import Hosts
 from syncrelay.status.metrics import exposition
 from syncrelay.status.page import HEADERS, PATHS, page_file
-from syncrelay.status.state import RelayState, is_ready, status_of
+from syncrelay.status.state import RelayState, is_ready
 from syncrelay.status.taps import TapRefusedError, Taps
 
 # An idle receive loop turns once a second, so one that has not for this long hangs.
@@ -155,7 +155,7 @@ def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _
         "/metrics": lambda environ, start: _answer(
             start, "200 OK", *exposition(state(), environ.get("HTTP_ACCEPT", ""))
         ),
-        "/status": lambda _, start: _answer(start, "200 OK", status_of(state()).as_json(), _JSON),
+        "/status": lambda _, start: _answer(start, "200 OK", _status(state()), _JSON),
         "/tap": lambda environ, start: _tapped(start, taps, environ["QUERY_STRING"], state),
         "/livez": lambda _, start: _liveness(start, state()),
         "/readyz": lambda _, start: _readiness(start, state()),
@@ -178,6 +178,12 @@ def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _
         return [] if environ["REQUEST_METHOD"] == "HEAD" else body
 
     return application
+
+
+def _status(state: RelayState) -> bytes:
+    from syncrelay.status.as_document import status_of  # noqa: PLC0415  it may never be asked for
+
+    return status_of(state).as_json()
 
 
 def _liveness(start: _Start, state: RelayState) -> list[bytes]:

@@ -4,7 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from syncrelay.config.wording import counted
 from syncrelay.explain import Code, GroupReport, Severity, words
-from syncrelay.status import RelayState, status_of
+from syncrelay.status import RelayState
+from syncrelay.status.as_document import status_of
 from syncrelay.top.plain import WIDTH, group_lines, wrapped
 
 

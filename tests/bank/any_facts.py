@@ -28,7 +28,7 @@ from syncrelay.explain import (
 from syncrelay.explain.epochs import Reading
 from syncrelay.explain.summary import summarize
 from syncrelay.explain.troubles import troubles
-from syncrelay.status.state import group_of
+from syncrelay.status.as_document import group_of
 from syncrelay.sync.messages import DropReason
 from tests.explain.support import cases_flow, cases_graph, cases_stamps, cases_transforms
 from tests.explain.support.groups import BEGAN, MS, S

@@ -17,7 +17,7 @@ from syncrelay.config import ConfigError
 from syncrelay.explain import CauseLog, ClockState, Distribution, Finding, GroupFacts, GroupReport, explanation, with_ok
 from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.troubles import troubles
-from syncrelay.status.state import group_of
+from syncrelay.status.as_document import group_of
 from tests.bank.any_arrivals import judged
 from tests.bank.any_facts import at_limits, said_of
 from tests.bank.any_rigs import observed, played

@@ -15,7 +15,7 @@ from mcap.writer import Writer
 from syncrelay.cli.boundary import guarded
 from syncrelay.cli.dispatch import dispatch
 from syncrelay.cli.stop import StopRequest
-from syncrelay.status import status_of
+from syncrelay.status.as_document import status_of
 from syncrelay.top.app import TopApp
 from syncrelay.top.client import ask
 from tests.cli.command import BAD, GOOD

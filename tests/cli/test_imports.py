@@ -11,6 +11,7 @@ from tests.cli.command import GOOD, run_python
 _OF_OTHERS = {
     *("argcomplete", "jinja2", "lz4", "mcap", "rich", "rosbags", "ruamel"),
     *("textual", "zstandard", "syncrelay.recordings", "syncrelay.doctor", "syncrelay.rig", "syncrelay.top"),
+    "syncrelay.status.document",
 }
 _OF_THE_RELAY = {
     "numpy",
@@ -37,7 +38,7 @@ def imported(*commands, folder):
     (folder / "f.yaml").write_text(GOOD)
     done = run_python("-c", _SCRIPT, json.dumps(commands), folder=folder)
     names = json.loads(done.stdout.splitlines()[-1])
-    return {".".join(name.split(".")[:length]) for name in names for length in (1, 2)}, done.stderr
+    return {".".join(name.split(".")[:length]) for name in names for length in (1, 2, 3)}, done.stderr
 
 
 def test_help_and_wrong_usage_need_nothing_that_the_command_needs(tmp_path):
@@ -66,3 +67,14 @@ def test_the_relay_imports_nothing_that_only_other_commands_need(tmp_path):
     assert "--nonsense" in told
     assert found >= _OF_THE_RELAY
     assert found & _OF_OTHERS == set()
+
+
+@pytest.mark.ros
+def test_types_of_messages_are_used_without_what_generates_them(tmp_path):
+    script = (
+        "import sys; from syncrelay.ros.environment import require_rclpy; require_rclpy();"
+        "from std_srvs.srv import Trigger; Trigger.__class__.__import_type_support__();"
+        "print('rosidl_generator_py' in sys.modules, *sys.modules.keys() & {'em', 'lark'});"
+        "from rosidl_generator_py import generate_py_impl; print(generate_py_impl.generate_py.__name__)"
+    )
+    assert run_python("-c", script, folder=tmp_path).stdout == "True\ngenerate_py\n"

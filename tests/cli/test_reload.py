@@ -5,7 +5,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from syncrelay.status import status_of
+from syncrelay.status.as_document import status_of
 from tests.cli.command import run
 from tests.status.support.serving import running
 from tests.top import states

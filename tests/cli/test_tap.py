@@ -12,7 +12,8 @@ import pytest
 
 from syncrelay.config import Listen, load_text
 from syncrelay.explain import GroupLines, RecentDrop, Tape
-from syncrelay.status import RelayState, Taps, status_of
+from syncrelay.status import RelayState, Taps
+from syncrelay.status.as_document import status_of
 from syncrelay.status.server import Server
 from syncrelay.sync import DropReason
 from syncrelay.top.tap import plain_line

@@ -23,7 +23,7 @@ from syncrelay.relay.listening import Heard, Listener
 from syncrelay.relay.look import look
 from syncrelay.relay.ports import EndpointInfo, Purpose
 from syncrelay.relay.relay import Relay
-from syncrelay.status import status_of
+from syncrelay.status.as_document import status_of
 from tests.conformance.script import PAIR, VECTOR, Script
 from tests.conformance.seen import MS, Seen, by_reason, endpoint, message, short_of, without_figures
 from tests.conformance.world import Reader, World, Writer

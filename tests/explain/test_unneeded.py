@@ -8,7 +8,8 @@ import pytest
 from syncrelay.explain import FOR_WANT_OF_A_PARTNER, RecentDrop, Standing, drop_fates
 from syncrelay.explain.summary import summarize
 from syncrelay.explain.unneeded import may_set_pace
-from syncrelay.status import RelayState, status_of
+from syncrelay.status import RelayState
+from syncrelay.status.as_document import status_of
 from syncrelay.sync import DropReason
 from syncrelay.top.group_blocks import recent_sets
 from syncrelay.top.plain import group_lines

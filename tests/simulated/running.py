@@ -11,7 +11,7 @@ from syncrelay.relay.relay import Relay
 from syncrelay.relay.running import run, services
 from syncrelay.relay.transitions import Transitions
 from syncrelay.runtime import Runtime
-from syncrelay.status import status_of
+from syncrelay.status.as_document import status_of
 from syncrelay.top.plain import summary
 
 

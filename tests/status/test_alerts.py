@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from syncrelay.status import RelayState, status_of
+from syncrelay.status import RelayState
+from syncrelay.status.as_document import status_of
 from syncrelay.status.metrics import exposition
 from tests.top import states
 

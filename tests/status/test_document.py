@@ -8,8 +8,9 @@ import pytest
 
 from syncrelay import own_version
 from syncrelay.explain import Endpoint, Mismatch, Sender, explanation
-from syncrelay.status import Level, Phase, group_of, level, read_status, status_of
-from syncrelay.status.document import NotAStatusError
+from syncrelay.status import Level, Phase, level
+from syncrelay.status.as_document import group_of, status_of
+from syncrelay.status.document import NotAStatusError, read_status
 from tests.status.support.states import BEGAN, relay, started, working
 
 _SECOND = replace(started(), facts=replace(started().facts, name="rear"))

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from syncrelay.status import Level, Phase, status_of
+from syncrelay.status import Level, Phase
+from syncrelay.status.as_document import status_of
 from syncrelay.status.headline import headline
 from tests.top import states
 

@@ -8,7 +8,7 @@ from contextlib import ExitStack, closing
 import pytest
 
 from syncrelay.errors import UsageError
-from syncrelay.status import status_of
+from syncrelay.status.as_document import status_of
 from syncrelay.top.client import NoAnswerError, OtherServerError, ask, base_urls, search
 from tests.status.support.serving import running
 from tests.top import states

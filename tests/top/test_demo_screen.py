@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from syncrelay.cli.demo import shipped_config
-from syncrelay.status import status_of
+from syncrelay.status.as_document import status_of
 from syncrelay.top.demo_screen import frame, window_of
 from syncrelay.top.plain import Moment, line_of, summary_of
 from tests.top.rigs import Sensor, simulated

@@ -2,7 +2,7 @@
 
 import pytest
 
-from syncrelay.status import status_of
+from syncrelay.status.as_document import status_of
 from syncrelay.top import phrases
 from syncrelay.top.client import Answer
 from syncrelay.top.names import fitted_names, short_names
