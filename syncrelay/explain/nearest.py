@@ -224,8 +224,11 @@ class NearestSpans:
             begin = max(begin, self._measured_until + 1)
         pivots = self._stamps[pivot]
         pivots = pivots[bisect_left(pivots, begin) : bisect_right(pivots, end)]
-        others = [each for index, each in enumerate(self._stamps) if index != pivot]
-        if len(others) == 1:
+        # Partners with the same stamps, as of one trigger, are in each set: there is nothing to measure.
+        others = [each for each in self._stamps if each[bisect_left(each, begin) : bisect_right(each, end)] != pivots]
+        if not others:
+            spans = [0] * len(pivots)
+        elif len(others) == 1:
             # As of most groups, and without the list of its sides.
             spans = [self._measure_one(_side(others[0], stamp)) for stamp in pivots]
         else:
@@ -252,6 +255,9 @@ def _tightest_span(sides: list[tuple[int, int]]) -> int:
     best, reach = lefts[-1], 0
     for left, (_, after) in zip(lefts[-2::-1], reversed(sides), strict=True):
         reach = max(reach, after)
+        if reach >= best:
+            # It only grows.
+            break
         best = min(best, left + reach)
     return best
 
