@@ -29,8 +29,10 @@ _TRIED_MESSAGES: Final = 2_000
 # A slow input's rate is that of this many messages, however old they are.
 _RATE_FROM: Final = 5
 _DRIFT_POINTS: Final = 300
-# Drift costs more than all other figures, and from many points it changes slowly.
+# Drift costs more than all other figures. From many points it changes slowly: it is measured when so many are new, or
+# one of twenty.
 _DRIFT_EVERY: Final = 5
+_NEW_POINTS: Final = 20
 _FEW_POINTS: Final = 12
 _NONE: Final[Mapping[DropReason, int]] = {}
 _PERIODS: Final = 20
@@ -306,7 +308,8 @@ class InputObservation:
         # What came fastest was held up least: the least delay tells more of the clock than of the load.
         self._points.append(((stamped[0][1] + stamped[-1][1]) // 2, least))
         self._points_seen += 1
-        if len(self._points) < _FEW_POINTS or self._points_seen % _DRIFT_EVERY == 0:
+        every = max(_DRIFT_EVERY, len(self._points) // _NEW_POINTS)
+        if len(self._points) < _FEW_POINTS or self._points_seen % every == 0:
             self._drift = drift(self._points)
 
     def _find_bursts(self, stamped: Arrivals, delays: Sequence[int], least: int, most: int) -> None:
