@@ -1,4 +1,4 @@
-"""Every file in invalid/ begins with a comment that holds the errors it gives, in full.
+"""Every file in invalid/, and in that of test files, begins with a comment that holds the errors it gives, in full.
 
 Lists of policies and of keys come from the models, and stand there in braces. In the files in by_no_schema/ the JSON
 Schema finds nothing.
@@ -12,8 +12,10 @@ import pytest
 from syncrelay.config import ConfigError, load
 from syncrelay.config.installed import installed_policies, shared_keys
 from syncrelay.config.wording import all_of, one_of
+from syncrelay.recordings.cases import load_suite
 
 FOLDER = Path(__file__).parent / "invalid"
+OF_TESTS = Path(__file__).parents[1] / "recordings/cases/invalid"
 
 
 def expected_errors(file: Path) -> str:
@@ -39,4 +41,12 @@ def test_a_faulty_file_gives_the_errors_that_it_begins_with(file, environ, monke
     monkeypatch.chdir(file.parent)
     with pytest.raises(ConfigError) as raised:
         load(file.name, environ=environ)
+    assert str(raised.value) == expected_errors(file)
+
+
+@pytest.mark.parametrize("file", sorted(OF_TESTS.glob("*.yaml")), ids=lambda file: file.stem)
+def test_a_faulty_test_file_gives_the_errors_that_it_begins_with(file, monkeypatch):
+    monkeypatch.chdir(OF_TESTS)
+    with pytest.raises(ConfigError) as raised:
+        load_suite(file.name, environ={})
     assert str(raised.value) == expected_errors(file)

@@ -1,6 +1,7 @@
-"""The schema that editors check by says what the models say."""
+"""The schemas that editors check by, of files of groups and of test files, say what the models say."""
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -9,14 +10,16 @@ import yaml
 from jsonschema import Draft7Validator
 
 from syncrelay.config.file import file_format
-from syncrelay.config.schema import json_schema
+from syncrelay.config.schema import ID, json_schema
+from syncrelay.recordings.cases import models
+from tests.cli.command import ROOT, run_here
 from tests.drawn_files import models_of
 
 HERE = Path(__file__).parent
 FORMAT = file_format()
 SCHEMA = json_schema()
 VALIDATOR = Draft7Validator(SCHEMA)
-GOOD_FILES = [*sorted((HERE / "valid").glob("*.yaml")), *sorted((HERE.parents[1] / "configs").glob("*.yaml"))]
+TESTS_SCHEMA = models.cases_schema()
 
 
 def parsed(file):
@@ -35,29 +38,64 @@ class Yaml12Loader(yaml.SafeLoader):
 Yaml12Loader.add_implicit_resolver("tag:yaml.org,2002:bool", re.compile("true|false"), ["t", "f"])
 
 
-WRONG_FILES = sorted((HERE / "invalid").rglob("*.yaml"))
+# Of test files, what no schema can tell: what names mean, what is drawn, how keys bear on each other.
+_BEYOND_A_SCHEMA = {
+    *("meanings", "no_config", "several_groups", "said_of_letters", "no_moment", "nothing_changed", "tests_itself"),
+}
 
 
-def test_the_schema_is_draft_7():
-    Draft7Validator.check_schema(SCHEMA)
-    assert SCHEMA["$schema"] == "http://json-schema.org/draft-07/schema#"
-    assert "discriminator" not in str(SCHEMA)
-    assert "$defs" not in str(SCHEMA)
+def _files() -> Iterator[Any]:
+    """Every file that there is, by which schema it is checked, and whether that finds nothing."""
+    of_tests = HERE.parent / "recordings/cases/invalid"
+    for folder, of, good in (
+        (HERE / "valid", SCHEMA, True),
+        (ROOT / "configs", SCHEMA, True),
+        # No schema can tell how keys bear on each other, what is installed, what the environment holds.
+        (HERE / "invalid", SCHEMA, False),
+        (HERE / "invalid/by_no_schema", SCHEMA, True),
+        (ROOT / "configs/tests", TESTS_SCHEMA, True),
+        (of_tests, TESTS_SCHEMA, False),
+    ):
+        for file in sorted(folder.glob("*.yaml")):
+            is_good = good or (folder == of_tests and file.stem in _BEYOND_A_SCHEMA)
+            yield pytest.param(file, of, is_good, id=f"{folder.name}/{file.stem}")
 
 
-@pytest.mark.parametrize("file", GOOD_FILES, ids=lambda file: file.stem)
-def test_a_good_file_is_good_by_the_schema(file):
-    assert list(VALIDATOR.iter_errors(parsed(file))) == []
+@pytest.mark.parametrize(
+    ("printed", "named", "kept", "words"),
+    [
+        (SCHEMA, ID, "schema/syncrelay-1.json", ["schema"]),
+        (TESTS_SCHEMA, models.SCHEMA_ID, "schema/syncrelay-test-1.json", ["schema", "--test"]),
+    ],
+    ids=["groups", "tests"],
+)
+def test_the_schema_is_draft_7_and_the_one_in_the_repository_is_that_which_is_printed(
+    printed, named, kept, words, tmp_path
+):
+    Draft7Validator.check_schema(printed)
+    assert (printed["$schema"], printed["$id"]) == ("http://json-schema.org/draft-07/schema#", named)
+    assert not re.search("discriminator|[$]defs", str(printed))
+    done = run_here(*words, folder=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == (ROOT / kept).read_text(), "renew it with `make schema`"
 
 
-@pytest.mark.parametrize("file", WRONG_FILES, ids=lambda file: file.stem)
-def test_what_is_wrong_in_itself_is_wrong_by_the_schema(file):
+def test_the_schema_is_named_by_the_version_of_the_files_that_it_describes():
+    (version,) = [each["const"] for each in SCHEMA["properties"]["version"]["anyOf"] if "const" in each]
+    assert SCHEMA["$id"] == f"urn:syncrelay:schema:{version}"
+
+
+@pytest.mark.parametrize(("file", "of", "is_good"), [*_files()])
+def test_what_is_wrong_in_itself_is_wrong_by_the_schema_and_nothing_else_is(file, of, is_good):
     try:
         keys = parsed(file)
     except yaml.YAMLError:
+        assert not is_good
         return  # a schema is asked about what can be parsed
-    # No schema can tell how keys bear on each other, what is installed, what the environment holds.
-    assert VALIDATOR.is_valid(keys) == (file.parent.name == "by_no_schema"), "is the file in the right folder?"
+    found = [each.message for each in Draft7Validator(of).iter_errors(keys)]
+    assert (not found) == is_good, found or "is the file in the right folder?"
+    if file.parent == ROOT / "configs/tests":
+        assert file.read_text().startswith("# yaml-language-server: $schema=../../schema/syncrelay-test-1.json\n")
 
 
 def test_every_key_is_in_the_schema_with_a_description():
@@ -80,6 +118,17 @@ def test_every_optional_key_says_its_default():
         if not info.is_required() and "Default: " not in (info.description or "")
     ]
     assert silent == []
+
+
+def test_every_key_of_a_test_file_is_described_and_says_its_default():
+    described = {**TESTS_SCHEMA["definitions"], "CasesFile": TESTS_SCHEMA}
+    for model in (
+        *(models.CasesFile, models.Case, models.InputSource),
+        *(models.Expectation, models.InputExpectation),
+    ):
+        for key, info in model.model_fields.items():
+            text = described[model.__name__]["properties"][key]["description"]
+            assert info.is_required() or "Default: " in text, (model, key)
 
 
 def test_the_default_that_is_said_is_the_default():
