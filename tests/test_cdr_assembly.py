@@ -45,29 +45,6 @@ def _assembler() -> Assembler:
     return Assembler(_TYPES.__getitem__, "a/Set", _DEFAULT)
 
 
-def test_a_field_loses_padding_that_its_new_place_does_not_need():
-    assert _assembler().assemble({"box": _BOX}) == bytes.fromhex(
-        "00 01 00 00"
-        "05 00 00 00"  # number, and up to the uint32
-        "11 22 33 44"  # box.stamp, directly before the double
-        "00 00 00 00 00 00 f0 3f"
-        "03 00 00 00  61 62 00"
-        "00"  # up to the uint16
-        "07 00"
-        "00 00"  # up to the length of the note
-        "01 00 00 00 00"
-    )
-
-
-def test_fields_that_are_not_given_have_their_defaults():
-    assert _assembler().assemble({}) == _DEFAULT
-
-
-def test_what_is_behind_a_message_in_its_payload_is_left_out():
-    assert _assembler().assemble({"level": bytes.fromhex("00 01 00 00  09 00 56 57")})[26:28] == b"\x09\x00"
-    assert len(_assembler().assemble({"level": bytes.fromhex("00 01 00 00  09 00 56 57")})) == len(_DEFAULT)
-
-
 @pytest.mark.parametrize(
     ("payload", "why"),
     [

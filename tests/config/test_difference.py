@@ -24,36 +24,9 @@ def keys(old: str, new: str, environ: dict[str, str]) -> list[tuple[str, str | N
     return [(f"{each.topic or ''} {each.key}".strip(), each.old, each.new) for each in change.keys]
 
 
-def test_groups_are_kept_rebuilt_started_and_ended_by_what_they_are(environ):
-    old = file(FRONT, REAR, group("gone", "/a", "/b"))
-    new = file(group("new", "/a", "/b"), group("rear", "/a", "/c", keys="queue_size: 5"), FRONT)
-    found = between(old, new, environ)
-    gone = found.exchange
-    assert (gone.kept, gone.rebuilt, gone.started, gone.ended) == (("front",), ("rear",), ("new",), ("gone",))
-    assert str(gone) == "reloaded: 1 group unchanged; rebuilt rear; started new; ended gone"
-    assert not found.is_empty
-
-
 def test_a_group_that_a_bug_stopped_is_rebuilt_though_its_keys_are_the_same(environ):
     groups = load_text(file(FRONT, REAR), environ=environ).groups
     assert exchange(groups, groups, stopped=["rear"]).rebuilt == ("rear",)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "expected"),
-    [
-        ({}, {"keys": "queue_size: 5"}, [("queue_size", None, "5")]),
-        ({"keys": "max_wait: 100ms"}, {"keys": "max_wait: 0.2"}, [("max_wait", "100ms", "0.2")]),
-        (
-            {},
-            {"keys": "output_prefix: /new"},
-            [("output_prefix", None, "/new"), ("/a output", "/front/a", "/new/a"), ("/b output", "/front/b", "/new/b")],
-        ),
-    ],
-)
-def test_a_key_is_told_with_its_values_as_they_are_written(old, new, expected, environ):
-    before, after = (file(group("front", "/a", "/b", **keys)) for keys in (old, new))
-    assert keys(before, after, environ) == expected
 
 
 @pytest.mark.parametrize(

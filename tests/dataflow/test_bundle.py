@@ -63,24 +63,6 @@ def _whole(number: int, left: bytes, right: bytes, missing: bytes, *stamps: int)
 
 
 @pytest.mark.parametrize("flow", FLOWS)
-def test_each_set_is_published_once_with_its_number_and_what_is_missing(flow):
-    group, outlet = _group(flow), Outlet()
-    group.connect_bundle(_bundle(group), outlet)
-    first, second = vector(BEGIN, frame_id=""), vector(BEGIN + MS, frame_id="")
-    for index in (0, 1):
-        group.flow.receive(index, _payload(first), BEGIN)
-    group.flow.receive(0, _payload(second), BEGIN + MS)
-    group.expire(10**10)
-    # Vectors without a frame take 40 bytes wherever they stand.
-    empty = struct.pack("<iIIB3x24x", 0, 0, 1, 0)
-    none, right = struct.pack("<I", 0), struct.pack("<II6s2x", 1, 6, b"right\0")
-    assert outlet.log == [
-        _whole(1, first[4:], first[4:], none, BEGIN, BEGIN),
-        _whole(2, second[4:], empty, right, BEGIN + MS, 0),
-    ]
-
-
-@pytest.mark.parametrize("flow", FLOWS)
 def test_sets_that_leave_at_once_are_bundled_whichever_input_comes_last(flow):
     topics = inputs({"/left": VECTOR, "/right": VECTOR})
     group, outlet, rights = _group(flow, topics=topics, outputs=True, max_wait=None), Outlet(), [Outlet(), Outlet()]

@@ -1,8 +1,6 @@
 """The simulated rig: its times repeat, its messages are valid, its processes end with whoever started them."""
 
-import mmap
 import os
-import secrets
 import signal
 import subprocess
 import sys
@@ -196,14 +194,3 @@ def test_a_profile_of_the_users_own_stays(monkeypatch, name):
     before = dict(os.environ)
     with quick_discovery():
         assert dict(os.environ) == before
-
-
-def test_what_a_living_process_has_mapped_is_not_left(ros_domain):
-    segment = FOLDER / f"fastrtps_{secrets.token_hex(8)}"
-    segment.write_bytes(bytes(mmap.PAGESIZE))
-    try:
-        with segment.open("r+b") as file, mmap.mmap(file.fileno(), 0):
-            assert left_of(ros_domain, {segment}) == set()
-        assert left_of(ros_domain, {segment}) == {segment}
-    finally:
-        segment.unlink()
