@@ -112,77 +112,44 @@ def fleet(tmp_path_factory):
     return drawn
 
 
-def test_the_worst_recordings_come_first(fleet):
-    rows = fleet.ask(0)
-    worst = fleet.of("wide", "missing")
-    assert {row["recording"] for row in rows[: len(worst)]} == worst
-    assert [row["share"] for row in rows] == sorted(row["share"] for row in rows)
-
-
-def test_groups_below_80_percent_are_counted(fleet):
-    (row,) = fleet.ask(1)
-    assert (row["group_name"], row["below"]) == ("front", len(fleet.of("wide", "missing")))
-    assert row["recordings"] == _DRAWN - len(fleet.of("torn"))
-
-
-def test_a_robots_days_have_the_mean_of_their_shares(fleet):
+def test_each_query_of_the_page_finds_what_was_drawn(fleet):
+    assert len(_QUERIES) == 10
+    worst, below, days, findings, missing, slops, changed, unread, silent, rates = map(fleet.ask, range(10))
+    torn, without, wide = fleet.of("torn"), fleet.of("missing"), fleet.of("wide")
+    n_read = _DRAWN - len(torn)
+    assert {row["recording"] for row in worst[: len(wide | without)]} == wide | without
+    assert [row["share"] for row in worst] == sorted(row["share"] for row in worst)
+    assert [(row["group_name"], row["below"], row["recordings"]) for row in below] == [
+        ("front", len(wide | without), n_read)
+    ]
     shares: dict[tuple[str, str], list[float]] = {}
     for each in fleet.drawn:
         if each.share is not None:
             shares.setdefault((each.robot, _DAYS[each.day]), []).append(each.share)
-    rows = fleet.ask(2)
-    assert [(row["robot"], row["day"]) for row in rows] == sorted(shares)
-    for row in rows:
+    assert [(row["robot"], row["day"], row["recordings"]) for row in days] == [
+        (*day, len(shares[day])) for day in sorted(shares)
+    ]
+    for row in days:
         drawn = shares[row["robot"], row["day"]]
-        assert row["recordings"] == len(drawn)
         assert row["mean_share"] == pytest.approx(sum(drawn) / len(drawn), abs=0.05)
-
-
-def test_findings_are_counted_by_recordings(fleet):
-    rows = fleet.ask(3)
-    counts = {row["code"]: row["recordings"] for row in rows}
-    assert counts["over_slop"] == len(fleet.of("wide"))
-    assert counts["no_publisher"] == len(fleet.of("missing"))
+    counts = {row["code"]: row["recordings"] for row in findings}
+    assert (counts["over_slop"], counts["no_publisher"]) == (len(wide), len(without))
     assert [*counts.values()] == sorted(counts.values(), reverse=True)
-
-
-def test_a_topic_that_is_missing_is_counted(fleet):
-    (row,) = fleet.ask(4)
-    assert (row["topic"], row["missing"]) == ("/lidar", len(fleet.of("missing")))
-    assert row["recordings"] == _DRAWN - len(fleet.of("torn"))
-
-
-def test_another_slop_is_tried_on_the_whole_fleet(fleet):
+    assert [(row["topic"], row["missing"], row["recordings"]) for row in missing] == [("/lidar", len(without), n_read)]
     both = [each for each in fleet.drawn if each.kind in ("good", "wide", "half")]
     # A set holds a message of the lidar, which is there half the time or always.
     sets = {each: each.rate_hz * _LASTS_S / (2 if each.kind == "half" else 1) for each in both}
-    for row in fleet.ask(5):
+    for row in slops:
         given = sum(sets[each] for each in both if row["slop_ms"] >= (15 if each.kind == "wide" else 3))
         assert row["share"] == pytest.approx(given / sum(sets.values()), abs=0.05), row
-
-
-def test_two_releases_of_a_file_differ_where_slop_decides(fleet):
-    rows = fleet.ask(6)
-    assert {row["recording"] for row in rows} == fleet.of("wide")
-    assert all(row["old_share"] == 0 and row["change"] > 0.9 for row in rows)
-
-
-def test_what_could_not_be_read_is_listed_with_the_reason(fleet):
-    rows = fleet.ask(7)
-    assert {row["recording"] for row in rows if row["error"]} == fleet.of("torn")
-    assert {row["recording"] for row in rows if row["problems"]} == fleet.of("missing")
-
-
-def test_sensors_that_were_silent_are_listed(fleet):
-    rows = fleet.ask(8)
-    assert {row["recording"] for row in rows} == fleet.of("half", "missing")
-    assert {row["topic"] for row in rows} == {"/lidar"}
-
-
-def test_rates_are_spread_as_they_were_drawn(fleet):
-    for row in fleet.ask(9):
+    assert {row["recording"] for row in changed} == wide
+    assert all(row["old_share"] == 0 and row["change"] > 0.9 for row in changed)
+    assert {row["recording"] for row in unread if row["error"]} == torn
+    assert {row["recording"] for row in unread if row["problems"]} == without
+    assert {row["recording"] for row in silent} == fleet.of("half", "missing")
+    assert {row["topic"] for row in silent} == {"/lidar"}
+    for row in rates:
         assert (row["least"], row["greatest"]) == pytest.approx((5, 20), rel=0.01), row
-    assert len(_QUERIES) == 10
 
 
 def test_the_lines_of_json_are_the_rows_of_the_table(fleet):
