@@ -47,9 +47,11 @@ class LatestAtTicks(Queued):
 
     __slots__ = (
         "_fed_until",
+        "_has_changed",
         "_losses",
         "_max_ages",
         "_passed",
+        "_possible",
         "_queue_size",
         "_queues",
         "_quorum",
@@ -84,6 +86,9 @@ class LatestAtTicks(Queued):
         self._passed = -1
         self._until = 0
         self._fed_until = -REST_NS
+        # The next possible tick, as long as nothing has changed: it is asked for at every turn of the loop.
+        self._possible: int | None = None
+        self._has_changed = True
 
     def for_required(self, required: Sequence[bool], quorum: int) -> tuple["LatestAtTicks", OptionalInputs]:
         policy = LatestAtTicks(
@@ -98,7 +103,7 @@ class LatestAtTicks(Queued):
 
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
         queue = self._queues[place]
-        self._fed_until = self._until
+        self._fed_until, self._has_changed = self._until, True
         replaced = queue.insert(stamp, message)
         outcomes: list[Outcome] = [] if replaced is None else [Drop(replaced, DropReason.DUPLICATE)]
         outcomes += self._drop_useless(place, stamp)
@@ -112,10 +117,12 @@ class LatestAtTicks(Queued):
         self._begin_again_if_fallen(until)
         outcomes: list[Outcome] = []
         passed = self.ticks.last_until(until)
+        if passed <= self._passed:
+            return outcomes
         while (tick := self._next_possible()) is not None and tick <= passed:
-            self._passed = tick
+            self._pass(tick)
             self._emit(self.ticks.at(tick), outcomes)
-        self._passed = max(self._passed, passed)
+        self._pass(passed)
         return outcomes
 
     def next_tick(self) -> int | None:
@@ -124,20 +131,33 @@ class LatestAtTicks(Queued):
 
     def pass_over(self, until: int) -> None:
         self._begin_again_if_fallen(until)
-        self._passed = max(self._passed, self.ticks.last_until(until))
+        self._pass(max(self._passed, self.ticks.last_until(until)))
+
+    def flush(self, reason: DropReason) -> list[Drop]:
+        self._has_changed = True
+        return super().flush(reason)
 
     def let_go(self, reason: DropReason) -> list[Drop]:
         """Drop all but the latest message of every input."""
+        self._has_changed = True
         return [drop for queue in self._queues for drop in queue.drop(max(0, len(queue.stamps) - 1), reason)]
 
     def _begin_again_if_fallen(self, until: int) -> None:
         if until < self.ticks.at(self._passed) - _FALL_NS:
-            self._passed = self.ticks.last_until(until)
+            self._pass(self.ticks.last_until(until))
             self._fed_until = min(self._fed_until, until)
         self._until = until
 
+    def _pass(self, tick: int) -> None:
+        self._passed, self._has_changed = tick, True
+
     def _next_possible(self) -> int | None:
         """Return the next tick at which every required input has a message, and as many inputs as are needed."""
+        if self._has_changed:
+            self._possible, self._has_changed = self._search(), False
+        return self._possible
+
+    def _search(self) -> int | None:
         tick = self._passed + 1
         last = self.ticks.last_until(self._fed_until + REST_NS)
         while tick <= last:
