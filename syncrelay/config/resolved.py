@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from syncrelay.clock import DeviceClock, Step
 from syncrelay.config.bundle import BundledInput, BundleKeys
@@ -61,7 +62,7 @@ class BundleConfig:
     qos: QosPreset | QosOverrides
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class GroupConfig:
     """A group. `restamp` is the engine's: None, one of Restamp, or an input's index.
 
@@ -99,7 +100,7 @@ class GroupConfig:
         """The ticks of the clock that makes its sets; None where messages do."""
         return self.options.ticks
 
-    @property
+    @cached_property
     def required(self) -> tuple[int, ...]:
         """The inputs that every set needs."""
         return tuple(index for index, topic in enumerate(self.topics) if topic.required)

@@ -82,6 +82,8 @@ def _joined(points: Sequence[Point], slope: float) -> Sequence[Point]:
 def _least_of_parts(points: Sequence[_T], heights: Sequence[float], most: int) -> list[_T]:
     """Divide points into no more parts than so many, of as many each, and return the lowest point of each."""
     of = -(-len(points) // most)
+    if of <= 1:
+        return [*points]
     firsts = range(0, len(points), of)
     return [points[heights.index(min(heights[first : first + of]), first)] for first in firsts]
 

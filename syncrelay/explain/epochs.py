@@ -212,11 +212,12 @@ def _newest(stamps: Sequence[int], delays: Sequence[int]) -> slice:
     count = len(stamps)
     if not count:
         return slice(0)
-    end = stamps[-1] + delays[-1]
+    begin = stamps[-1] + delays[-1] - _LATELY
     first = max(0, count - _FEWEST)
     step = max(1, count // _ENOUGH)
-    while first > 0 and end - (stamps[first - 1] + delays[first - 1]) <= _LATELY:
-        first = max(0, first - step)
+    while first > 0 and stamps[first - 1] + delays[first - 1] >= begin:
+        first -= step
+    first = max(0, first)
     step = max(1, (count - first) // _ENOUGH)
     return slice(first + (count - 1 - first) % step, count, step)
 

@@ -58,12 +58,10 @@ class Rule(NamedTuple):
     find: Callable[[GroupFacts], Iterable[Fault]]
     unless_all: Callable[[InputFacts], bool] | None = None
 
-    def findings(self, facts: GroupFacts) -> list[Finding]:
-        """Return what it finds."""
-        return [
-            Finding(self.code, severity, text, suggestion, about, explains, inputs)
-            for text, suggestion, severity, about, explains, inputs in self.find(facts)
-        ]
+    def findings(self, facts: GroupFacts) -> Iterator[Finding]:
+        """Yield what it finds."""
+        for text, suggestion, severity, about, explains, inputs in self.find(facts):
+            yield Finding(self.code, severity, text, suggestion, about, explains, inputs)
 
 
 def found_by(rules: Iterable[Rule], facts: GroupFacts) -> Iterator[Finding]:

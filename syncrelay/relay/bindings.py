@@ -37,9 +37,11 @@ class GroupBinding:
         """What keeps the group from giving sets, in words; empty where nothing does."""
         if self.group.failure is not None:
             return "a reload or restart: a bug stopped it"
-        there = [not each.missing for each in sorted(self.inputs, key=lambda each: each.output.index)]
-        needed = self.group.config.enough(there)
-        missing = ", ".join(filter(None, (each.missing for each in self.inputs if each.output.index in needed)))
+        missing_of = {each.output.index: what for each in self.inputs if (what := each.missing)}
+        there = [index not in missing_of for index in range(len(self.inputs))]
+        # Nearly always nothing is missing, and this is asked ten times a second.
+        needed = self.group.config.enough(there) if missing_of else ()
+        missing = ", ".join(what for index, what in missing_of.items() if index in needed)
         if self.group.sleeps and self.publishers and not missing:
             return f"a subscriber of {one_of(each.topic_name for each in self.publishers)}"
         if not missing and self.bundle.refusal is not None and not self.group.config.options.outputs:
