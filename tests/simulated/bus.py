@@ -88,6 +88,9 @@ class Endpoint:
         defaults = _WRITER_DEFAULTS if self.is_writer else _READER_DEFAULTS
         left = {key: value for key, value in defaults.items() if getattr(profile, key) == "system_default"}
         self.profile = replace(profile, **left)
+        # Observed: the graph does not tell histories.
+        self.shown: Final = replace(self.profile, history="unknown", depth=0)
+        """What the graph tells of that."""
         self.depth: Final = _KEPT if profile.history == "keep_all" else max(1, profile.depth)
         """How many messages its history keeps."""
         self.is_ended = False
@@ -231,11 +234,11 @@ class Link:
         if (self.empty is not None or not sample.content) and not self._may_pass(sample):
             return
         bus = self.writer.bus
+        scheduler, weather, process = bus.scheduler, bus.weather, self.reader.participant.process
         self.under_way += 1
-        if not self.is_receiving or self.reader.participant.process.is_still:
+        if not self.is_receiving or process.is_dead or process.stalled_until > scheduler.now:
             self.waiting.append(sample)
             return
-        scheduler, weather = bus.scheduler, bus.weather
         when = scheduler.now + int(weather.latency * bus.random() ** 2)
         resent = weather.loss > 0 and bus.random() < weather.loss
         if resent:

@@ -3,7 +3,7 @@
 import logging
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -82,11 +82,9 @@ class SimulatedGraph:
         }
 
     def _info(self, each: Any) -> EndpointInfo:
-        # Observed: the graph does not tell histories.
-        profile = replace(each.profile, history="unknown", depth=0)
         if each.node in self._participant.named:
-            return EndpointInfo(each.node.name, each.node.namespace, each.type, profile, gid=each.gid)
-        return EndpointInfo(_NAMELESS, _NAMELESS, each.type, profile, is_named=False, gid=each.gid)
+            return EndpointInfo(each.node.name, each.node.namespace, each.type, each.shown, gid=each.gid)
+        return EndpointInfo(_NAMELESS, _NAMELESS, each.type, each.shown, is_named=False, gid=each.gid)
 
 
 class SimulatedSubscription:

@@ -469,16 +469,16 @@ class Promises:
         for before, seen in pairwise(self.seen[group.name]):
             goes_on = seen.code == "healthy" and seen.at - before.at < _LOOKS_S
             healthy_since = (healthy_since or seen.at) if goes_on else None
-            lately = moments[bisect_left(times, seen.at - _SHOWN_S) : bisect_left(times, seen.at - _LATE_S)]
-            left = sum(each.left is not None and each.left < seen.at for each in lately)
+            begin, end = bisect_left(times, seen.at - _SHOWN_S), bisect_left(times, seen.at - _LATE_S)
             is_well = healthy_since is not None and seen.at - healthy_since > _SHOWN_S
-            if is_well and bisect_left(sent, seen.at) - bisect_left(sent, seen.at - _SHOWN_S) < len(lately) / 3 - 5:
+            if is_well and bisect_left(sent, seen.at) - bisect_left(sent, seen.at - _SHOWN_S) < (end - begin) / 3 - 5:
                 yield f"{seen.at:.2f} s: {group.name}: {seen.code}: {seen.text}\n    but few sets leave"
                 return
-            is_bad = seen.code in _SETS_ARE_MISSING and len(lately) > (_SHOWN_S - _LATE_S) * self.world.plan.hz - 3
-            is_odd = self._happened(_BETWEEN, seen.at - HEALED_S, seen.at)
-            if is_bad and left == len(lately) and self._is_calm(group, seen.at) and not is_odd:
-                what = f"{left} of {len(lately)} sets left in the last {_SHOWN_S:g} s"
+            is_bad = seen.code in _SETS_ARE_MISSING and end - begin > (_SHOWN_S - _LATE_S) * self.world.plan.hz - 3
+            if not is_bad or not self._is_calm(group, seen.at) or self._happened(_BETWEEN, seen.at - HEALED_S, seen.at):
+                continue
+            if all(each.left is not None and each.left < seen.at for each in moments[begin:end]):
+                what = f"{end - begin} of {end - begin} sets left in the last {_SHOWN_S:g} s"
                 yield f"{seen.at:.2f} s: {group.name}: {seen.code}: {seen.text}\n    but {what}"
                 return
 
