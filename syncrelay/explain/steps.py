@@ -155,8 +155,9 @@ class StampSteps:
             self._levels.extend(self._off)
             self._off.clear()
             return None
-        self._levels = deque(self._off, _LEVELS)
-        self._least, self._nearest_to_none = deque(self._off, _REMEMBERED), None
+        # A look that held messages of before and after the step, or late ones, is of neither level.
+        self._levels = deque(latest, _LEVELS)
+        self._least, self._nearest_to_none = deque(latest, _REMEMBERED), None
         self._off.clear()
         if min(abs(level), abs(before)) < _LIVE and abs(by) < _DAY:
             self.last = Step(self._change.at, by)

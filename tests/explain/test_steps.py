@@ -18,13 +18,20 @@ class Input:
         self.found: list[int] = []
         self.second = 0
 
-    def play(self, seconds: int, *, late: int = 0, after_gap: bool = False) -> None:
-        """Let so many seconds pass in which delays are so much greater; after a gap, messages come that much later."""
+    def play(self, seconds: int, *, late: int = 0, after_gap: bool = False, amid: bool = False) -> None:
+        """Let so many seconds pass in which delays are so much greater; after a gap, messages come that much later.
+
+        `amid` has the first messages of the first second be as before.
+        """
         gap = late if after_gap else 0
         for second in range(self.second, self.second + seconds):
             first = BEGAN + second * S + gap
             received = [first + n * self.period for n in range(max(1, S // self.period))]
-            delays = [round(5 * MS + late + self.chance.expovariate(1 / self.jitter)) for _ in received]
+            old = self.chance.randrange(len(received)) if amid and second == self.second else 0
+            delays = [
+                round(5 * MS + (late if n >= old else 0) + self.chance.expovariate(1 / self.jitter))
+                for n in range(len(received))
+            ]
             at = self.steps.add(received, delays, min(delays), max(delays), period=lambda: self.period)
             self.found += [] if at is None else [at]
         self.second += seconds
@@ -47,6 +54,18 @@ def test_a_clock_that_is_set_is_found_within_four_looks_with_its_size_and_time()
         each.play(20, late=-by)
         assert len(each.found) <= 1
     assert len(missed) <= chosen(short=2, long=50), missed
+
+
+def test_of_a_clock_that_is_set_back_amid_a_look_nothing_is_remembered_of_before():
+    remembered = []
+    for each in inputs("amid"):
+        by = round(5 * MS + 20 * each.jitter * each.chance.uniform(1, 20))
+        each.play(20)
+        each.play(20, late=by, amid=True)
+        least = each.steps.least
+        # Those of a level may differ by a quarter.
+        remembered += [(by, least)] if each.steps.last and least is not None and least < 0.7 * by else []
+    assert not remembered
 
 
 def test_what_is_late_after_a_gap_and_in_time_again_is_no_step():
