@@ -154,7 +154,8 @@ def _no_such_word(found: object, words: Sequence[str], loc: Location, document: 
     if close is not None:
         return f"unknown value {quoted(str(found))}{or_nearest(close)}"
     choices = [*words, _MAPPING_FORMS[str(loc[-2])]] if loc[-1] == "<name>" else words
-    elsewhere = " (that of a package is known where the package is installed)" if loc[-1] == "policy" else ""
+    is_a_name = loc[-1] == "policy" and isinstance(found, str)
+    elsewhere = " (that of a package is known where the package is installed)" if is_a_name else ""
     return f"expected {one_of(choices)}, found {describe(found)}{elsewhere}"
 
 
