@@ -80,7 +80,9 @@ def test_its_keys_are_validated_with_suggestions(package: Path, tmp_path: Path):
     assert run("validate", "fusion.yaml", folder=tmp_path, environ=_beside(package)).returncode == 0
     without = run("validate", "fusion.yaml", folder=tmp_path)
     assert without.returncode == 1
-    assert re.search("groups.good.policy: expected exact_time, .*, found the string `led_by` .that of", without.stderr)
+    assert re.search(
+        "groups.good.policy: expected exact_time, .*, found the string `led_by` .a policy of", without.stderr
+    )
 
 
 def test_editors_and_shells_complete_it(package: Path, tmp_path: Path):

@@ -1,7 +1,6 @@
 """The model of the whole file for the installed policies, and a lenient one for files with faults."""
 
 from collections.abc import Mapping
-from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass
 from functools import cache, partial, reduce
@@ -9,7 +8,7 @@ from operator import or_
 from types import GenericAlias
 from typing import Annotated, Any, Final, Literal, TypeVar
 
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, ValidationError, create_model
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, create_model
 from pydantic.fields import FieldInfo
 
 from syncrelay.config.bundle import BundleKeys
@@ -84,33 +83,6 @@ def file_format() -> FileFormat:
     return _format_of(installed_policies())
 
 
-def valid_keys(keys: Any) -> FileKeys:
-    """Return the keys of a file that is in order; raises ValidationError with all that is wrong with another.
-
-    To build the validators of all policies takes three times as long as those of one, so a file that names but one is
-    tried by itself first.
-    """
-    if (policy := _only_policy(keys)) is not None:
-        with suppress(ValidationError):
-            return _of_one(installed_policies().models[policy]).model_validate(keys)
-    return file_format().file.model_validate(keys)
-
-
-def _only_policy(keys: Any) -> str | None:
-    """Return the policy of all groups; None where `defaults` are written, whose model has the keys of every policy."""
-    match keys:
-        case {"groups": dict(groups)} if "defaults" not in keys:
-            named = {str(each.get("policy")) for each in groups.values() if isinstance(each, dict)}
-            return named.pop() if len(named) == 1 and named <= installed_policies().models.keys() else None
-        case _:
-            return None
-
-
-@cache
-def _of_one(group: type[Group]) -> type[FileKeys]:
-    return create_model("FileOfOnePolicy", __base__=FileKeys, groups=(_groups_of(group), ...))
-
-
 def partial_format() -> type[FileKeys]:
     """Return the model of a file in which no key is needed."""
     return _partial_format_of(installed_policies())
@@ -162,7 +134,7 @@ def _file(defaults: type[Keys], group: Any) -> type[FileKeys]:
         __base__=FileKeys,
         __doc__=FileKeys.__doc__,
         defaults=(defaults, Field(default=None, description=about_defaults)),
-        groups=(_groups_of(group), about_groups),
+        groups=(_dict_of(Annotated[str, AfterValidator(check_group_name)], group), about_groups),
     )
 
 
@@ -174,10 +146,6 @@ def _loose(info: FieldInfo, default: Any) -> tuple[Any, FieldInfo]:
     loose = copy(info)
     loose.default = default
     return info.annotation, loose
-
-
-def _groups_of(group: Any) -> Any:
-    return _dict_of(Annotated[str, AfterValidator(check_group_name)], group)
 
 
 def _dict_of(key: Any, value: Any) -> Any:

@@ -16,7 +16,7 @@ from syncrelay.config.defaults import merged_documents, merged_files, with_defau
 from syncrelay.config.document import Document, as_written, flow, plain
 from syncrelay.config.export import LerobotConfig, resolve_lerobot
 from syncrelay.config.export_checks import check_export
-from syncrelay.config.file import FileKeys, relay_form, valid_keys
+from syncrelay.config.file import FileKeys, file_format, relay_form
 from syncrelay.config.interfaces import Interfaces
 from syncrelay.config.listen import Listen
 from syncrelay.config.names_in_graph import NamesInFile
@@ -153,7 +153,7 @@ def _part(source: Source, environ: Mapping[str, str], *, is_alone: bool) -> _Par
         # Its groups may all be in the other files.
         keys = {"groups": {}, **keys}
     try:
-        return _Part(document, valid_keys(keys), problems)
+        return _Part(document, file_format().file.model_validate(keys), problems)
     except ValidationError as error:
         faults = error.errors(include_url=False)
         return _Part(*partial_file(document, faults), problems + translate(_known(faults), document, relay_form()))

@@ -155,7 +155,7 @@ def _no_such_word(found: object, words: Sequence[str], loc: Location, document: 
         return f"unknown value {quoted(str(found))}{or_nearest(close)}"
     choices = [*words, _MAPPING_FORMS[str(loc[-2])]] if loc[-1] == "<name>" else words
     is_a_name = loc[-1] == "policy" and isinstance(found, str)
-    elsewhere = " (that of a package is known where the package is installed)" if is_a_name else ""
+    elsewhere = " (a policy of another package needs that package installed)" if is_a_name else ""
     return f"expected {one_of(choices)}, found {describe(found)}{elsewhere}"
 
 

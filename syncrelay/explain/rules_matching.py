@@ -92,11 +92,9 @@ def _is_often_over(facts: GroupFacts, tolerance: Tolerance, nearest: Distributio
     """Whether so many of the nearest messages are farther apart than the tolerance that it is no chance."""
     # What was so a while ago, as while an input was away, is no more.
     lately = facts.figures.nearest_lately or nearest
+    # As nearly always it is none of these, which are few.
     over = lately.share_over(tolerance.ns)
-    if not over:
-        # As nearly always.
-        return False
-    over = min(nearest.share_over(tolerance.ns), over)
+    over = over and min(nearest.share_over(tolerance.ns), over)
     came_at_once = any(each.required and each.figures.bursts for each in facts.inputs)
     # What was held up may only seem far apart, and a wider slop would pair what came together.
     least = _MOST if came_at_once else _beyond_chance(_MISSED, len(nearest))

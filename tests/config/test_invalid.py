@@ -44,9 +44,9 @@ def test_a_faulty_file_gives_the_errors_that_it_begins_with(file, environ, monke
     assert str(raised.value) == expected_errors(file)
 
 
-@pytest.mark.parametrize("file", sorted(OF_TESTS.glob("*.yaml")), ids=lambda file: file.stem)
+@pytest.mark.parametrize("file", sorted(OF_TESTS.rglob("*.yaml")), ids=lambda file: file.stem)
 def test_a_faulty_test_file_gives_the_errors_that_it_begins_with(file, monkeypatch):
-    monkeypatch.chdir(OF_TESTS)
+    monkeypatch.chdir(file.parent)
     with pytest.raises(ConfigError) as raised:
         load_suite(file.name, environ={})
     assert str(raised.value) == expected_errors(file)
