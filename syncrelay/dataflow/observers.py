@@ -80,10 +80,14 @@ class Waits:
 
 
 class Losses:
-    """How many messages of a topic DDS lost. What a new publisher sent before it was found is no loss."""
+    """How many messages of a topic DDS lost. What a new publisher sent before it was found is no loss.
+
+    DDS may count that before the graph shows the publisher, so losses are taken at the next evaluation.
+    """
 
     def __init__(self) -> None:
         self._totals: deque[int] = deque(maxlen=_RECENT)
+        self._newest = 0
         self.total = 0
         """How many were lost since the relay started."""
         self._links: frozenset[Hashable] = frozenset()
@@ -91,15 +95,18 @@ class Losses:
 
     def observe(self, total: int, *, links: frozenset[Hashable]) -> None:
         """Take the total lost since the subscription was made; `links` are it with each publisher that there is."""
-        if links - self._links or (self._totals and total < self._totals[-1]):
+        is_anew = total < self._newest
+        is_new = bool(links - self._links)
+        if self._totals and (is_anew or not is_new):
+            self.total += self._newest - self._totals[-1]
+        if is_anew or is_new:
             self._settling = _SETTLING
         if self._settling:
             self._settling -= 1
             self._totals.clear()
-        elif self._totals:
-            self.total += total - self._totals[-1]
-        self._links = links
-        self._totals.append(total)
+        else:
+            self._totals.append(self._newest)
+        self._links, self._newest = links, total
 
     @property
     def recent(self) -> int:

@@ -55,13 +55,16 @@ _SETTLED = [(0, "a")] * 5
 @pytest.mark.parametrize(
     ("totals_and_publishers", "recent", "in_all"),
     [
-        pytest.param([*_SETTLED, (4, "a"), (5, "a")], 5, 5, id="what is lost of a known publisher counts"),
+        pytest.param([*_SETTLED, (4, "a"), *[(5, "a")] * 2], 5, 5, id="what is lost of a known publisher counts"),
         pytest.param([(8, "a")] * 8, 0, 0, id="what a first publisher sent before counts not"),
-        pytest.param([*_SETTLED[1:], (4, "a"), (5, "a")], 1, 1, id="nor what it sends before five evaluations"),
+        pytest.param([*_SETTLED[1:], (4, "a"), *[(5, "a")] * 2], 1, 1, id="nor what it sends before five evaluations"),
         pytest.param([*_SETTLED, (6, "ab"), (7, "ab")], 0, 0, id="nor what a second one sent before"),
         pytest.param([*_SETTLED, (6, "b"), (7, "b")], 0, 0, id="nor what one sent that took its place"),
-        pytest.param([*_SETTLED, (3, "a"), *[(1, "a")] * 6, (2, "a")], 1, 4, id="a new subscription counts from 0"),
-        pytest.param([*_SETTLED, (3, "a"), *[(3, "a")] * 10], 0, 3, id="after ten evaluations it counts in all only"),
+        pytest.param([*_SETTLED, (6, "a"), *[(6, "ab")] * 9], 0, 0, id="nor what is counted before the graph shows it"),
+        pytest.param(
+            [*_SETTLED, (3, "a"), *[(1, "a")] * 6, *[(2, "a")] * 2], 1, 4, id="a new subscription begins at 0"
+        ),
+        pytest.param([*_SETTLED, *[(3, "a")] * 12], 0, 3, id="after ten evaluations it counts in all only"),
     ],
 )
 def test_only_what_a_known_publisher_lost_of_late_is_a_loss(totals_and_publishers, recent, in_all):
