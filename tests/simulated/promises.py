@@ -412,7 +412,8 @@ class Promises:
         at_least = 2.0 if group.repeats else 0.0
         times = []
         for step in spoiling:
-            kind, end = KINDS[step.kind], step.at + step.seconds
+            # What waits for the next message waits for a second at most.
+            kind, end = KINDS[step.kind], step.at + step.seconds + plan.prompt
             times.append(((end if kind.at_end else step.at) - _BEFORE_S, end + max(at_least, kind.again_s)))
         return [(0.0, SETTLED_S), *times]
 
@@ -426,7 +427,8 @@ class Promises:
             return
         triggers = group.topics[:1] if group.repeats else group.required
         anchor = triggers[0]
-        sets = {each.numbers[group.topics.index(anchor)]: each.at for each in self.sets[group.name]}
+        # The first of each: what publishers have kept may come and leave again, to a subscription that is made anew.
+        sets = {each.numbers[group.topics.index(anchor)]: each.at for each in reversed(self.sets[group.name])}
         of = self._sensors[anchor].every
         for number, at in self._written[anchor].items():
             if number % of and not group.repeats:
@@ -438,7 +440,9 @@ class Promises:
 
     def _moments_of_any(self, group: Group) -> Iterator[_Moment]:
         """Yield those of which enough inputs were sent."""
-        sets = {number: each.at for each in self.sets[group.name] for number in each.numbers if number is not None}
+        sets = {
+            number: each.at for each in reversed(self.sets[group.name]) for number in each.numbers if number is not None
+        }
         for number in sorted({number for topic in group.topics for number in self._written[topic]}):
             came = sorted((at, topic) for topic in group.topics if (at := self._written[topic].get(number)) is not None)
             if len(came) >= group.quorum:
@@ -492,7 +496,9 @@ class Promises:
             count = bisect_left(times, last) - bisect_left(times, first)
             ticks = 2 * self.world.plan.hz
             is_calm = self._is_calm(group, first) and self._is_calm(group, last)
-            many = count > ticks + 2 and not self._happened(_TICKS_LATE, first - 10, last)
+            # Those that waited for transforms leave at once when these come.
+            waited = self.world.plan.hz if "transforms" in group.options else 0
+            many = count > ticks + waited + 2 and not self._happened(_TICKS_LATE, first - 10, last)
             if many or (count < ticks - 2 and is_calm):
                 yield f"{first} s: {group.name}: {count} sets in 2 s, of {ticks:g} ticks"
                 return
