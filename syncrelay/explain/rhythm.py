@@ -143,9 +143,9 @@ class PaceWatch:
 
     def _follow(self, last: Sequence[int]) -> None:
         self.may_be_slower = False
-        if len(last) <= _PERIODS:
-            self.now_hz = 0.0
-            self.slowed_from = None
+        # Stamps may begin anew, by another clock: who has slowed down has not recovered by that.
+        if len(last) <= (_PERIODS if self.slowed_from is None else _LATEST):
+            self.now_hz = 0.0 if self.slowed_from is None else self.now_hz
             return
         periods = list(map(sub, last[1:], last))
         self.now_hz = _pace_hz(periods)

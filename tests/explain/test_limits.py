@@ -247,11 +247,11 @@ def is_burst(held: int, period: int = 10 * MS) -> bool:
     return bool(list(bursts([*came, *((each, last + period + held + n) for n, each in enumerate(stamps))])))
 
 
-def slowed(*periods: int) -> bool:
-    """Whether an input that has sent with each of these periods has slowed."""
+def slowed(*periods: int, known: int = 21) -> bool:
+    """Whether an input that has sent with each of these periods has slowed, `known` messages with the last of them."""
     pace = PaceWatch()
-    for each in periods:
-        pace.observe([BEGAN + n * each for n in range(21)], 1)
+    for count, each in zip((*[21] * (len(periods) - 1), known), periods, strict=True):
+        pace.observe([BEGAN + n * each for n in range(count)], 1)
     return pace.slowed_from is not None
 
 
@@ -377,6 +377,7 @@ LIMITS: dict[str, tuple[int, int, int, IsSo]] = {
     "slowed": (0, S, 142_857_143, lambda by: slowed(*[100 * MS] * 9, by)),
     "slowed again": (0, S, 142_857_143, lambda by: slowed(*[100 * MS] * 20, *[300 * MS] * 9, *[100 * MS] * 3, by)),
     "slowed until": (S, 100 * MS, 117_647_058, lambda by: not slowed(*[100 * MS] * 9, 200 * MS, by)),
+    "slowed, and stamps begin anew": (0, 21, 9, lambda n: not slowed(*[100 * MS] * 9, 200 * MS, 100 * MS, known=n)),
     "steady for so long": (0, 9, 6, lambda n: slowed(*[100 * MS] * n, S)),
     "steady": (10 * MS, 100 * MS, 66_666_667, lambda by: slowed(*[100 * MS] * 5, *[by] * 4, S)),
     "steady but for": (9, 0, 2, lambda n: slowed(*[100 * MS] * (20 - n), *[10 * MS] * n, S)),
