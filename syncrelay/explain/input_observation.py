@@ -28,6 +28,8 @@ _LAST_MESSAGES: Final = 200
 _TRIED_MESSAGES: Final = 2_000
 # A slow input's rate is that of this many messages, however old they are.
 _RATE_FROM: Final = 5
+# Of the mean period.
+_AT_ONCE: Final = 0.1
 _DRIFT_POINTS: Final = 300
 # Drift costs more than all other figures. From many points it changes slowly: it is measured when so many are new, or
 # one of twenty.
@@ -339,7 +341,11 @@ class InputObservation:
         times = self._received
         if len(times) < 2 or times[-1] <= times[0]:  # noqa: PLR2004  two make a period
             return 0.0, 0.0
-        mean = (len(times) - 1) * _SECOND / (times[-1] - times[0])
+        # What a latched publisher had kept comes at once, and tells no rate.
+        first, last = 0, len(times) - 1
+        while first < last - 1 and (times[first + 1] - times[first]) * last < _AT_ONCE * (times[last] - times[0]):
+            first += 1
+        mean = (last - first) * _SECOND / (times[last] - times[first])
         usual = mean if len(times) >= _RATE_FROM else 0.0
         if not goes_on:
             return 0.0, usual

@@ -208,3 +208,13 @@ def test_of_an_input_that_ended_nothing_is_awaited():
         observation.figures(fed=10, dropped={}, seconds=10, now=BEGAN + after * S).may_step for after in (21, 40)
     ]
     assert awaited == [True, False]
+
+
+@given(kept=st.integers(0, 20), hz=st.integers(1, 200), count=st.integers(20, 100))
+def test_what_a_latched_publisher_had_kept_is_in_no_rate(kept, hz, count):
+    seen, period = InputObservation(), S // hz
+    live = [BEGAN + n * period for n in range(count)]
+    seen.add([(BEGAN - (kept - n) * period, BEGAN + n * MS // 100) for n in range(kept)])
+    seen.add([(at, at + period // 2) for at in live])
+    figures = seen.figures(fed=kept + count, dropped={}, seconds=10.0, now=live[-1] + period)
+    assert figures.usual_hz == pytest.approx(hz, rel=1 / count)
