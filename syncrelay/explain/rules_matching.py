@@ -109,9 +109,7 @@ def _beyond_chance(share: float, count: int) -> float:
 def is_near_again(facts: GroupFacts) -> bool:
     """Whether the newest messages all have a near partner, and so many of them that the others are of the past."""
     tolerance, spans = facts.tolerance, facts.figures.nearest.newest(len(facts.figures.nearest))
-    if tolerance is None:
-        return False
-    if not spans or spans[0] > tolerance.ns:
+    if tolerance is None or not spans or spans[0] > tolerance.ns:
         return False
     newest, *before = [len(list(run)) for is_near, run in groupby(spans, lambda each: each <= tolerance.ns) if is_near]
     # By the rule of succession: a few that were far do not show that all are.
