@@ -1,5 +1,6 @@
 """Real Fast DDS: a participant for each process of a script, within the test's process and kept for the next script."""
 
+import faulthandler
 import os
 import traceback
 from collections.abc import Callable, Iterator, Mapping
@@ -230,7 +231,10 @@ def serve(asked: Connection, folder: Path) -> None:
             script = next(each for each in SCRIPTS if each.title == title)
             try:
                 answer: Any = play(script, world, own)
+                world.clear()
             except Exception:  # noqa: BLE001  it is raised where the test can see it
-                answer = traceback.format_exc()
-            world.clear()
+                # What goes on in other threads tells why something does not end; nothing is known of what is left.
+                faulthandler.dump_traceback()
+                asked.send(traceback.format_exc())
+                return
             asked.send(answer)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import pytest
 
@@ -18,7 +18,12 @@ from tests.conformance.scripts import SCRIPTS
 from tests.conformance.seen import KNOWN, Seen, told
 from tests.conformance.simulated import SimulatedWorld
 from tests.faults.extent import IS_LONG
+from tests.ros.processes import DEADLINE_S
 from tests.ros.stage import IS_COMPILED
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+    from multiprocessing.context import SpawnProcess
 
 # Of some, not all types are installed everywhere.
 _OFTEN_MISSING: Final = [of for of in (TF, MARKER) if find_spec(of.partition("/")[0]) is None]
@@ -49,21 +54,36 @@ def _as_far_as_told(script: Script, seen: Seen, expected: Seen) -> Seen:
 
 @pytest.fixture(scope="module")
 def real(tmp_path_factory) -> Iterator[Callable[[Script, Path], Seen]]:
-    """Plays a script on real DDS, in a process for all of them."""
+    """Plays a script on real DDS, in a process for all of them; after one that fails in a new one."""
     spawn = multiprocessing.get_context("spawn")
-    ours, theirs = spawn.Pipe()
-    process = spawn.Process(target=serve, args=(theirs, tmp_path_factory.mktemp("real")))
-    process.start()
+    playing: list[tuple[Connection, SpawnProcess]] = []
+
+    def end() -> None:
+        ours, process = playing.pop()
+        if process.is_alive():
+            ours.send(None)
+        process.join(DEADLINE_S)
+        process.kill()
 
     def played(script: Script, folder: Path) -> Seen:
+        if not playing:
+            ours, theirs = spawn.Pipe()
+            process = spawn.Process(target=serve, args=(theirs, tmp_path_factory.mktemp("real")))
+            process.start()
+            # So that what it says ends with it.
+            theirs.close()
+            playing.append((ours, process))
+        ours, _ = playing[-1]
         ours.send((script.title, folder))
         answer = ours.recv()
+        if not isinstance(answer, Seen):
+            end()
         assert isinstance(answer, Seen), answer
         return answer
 
     yield played
-    ours.send(None)
-    process.join()
+    if playing:
+        end()
 
 
 @pytest.mark.long
