@@ -25,6 +25,9 @@ _LOG = logging.getLogger("syncrelay")
 
 # Discovery takes a few tenths of a second: before that, everything would be reported as missing.
 _GRACE_S: Final = 2.0
+# How long an end waits for reliable subscribers to acknowledge what was published on all outputs. They do so only at
+# the writer's next heartbeat, which may be 3 s away.
+_ACKNOWLEDGE_NS: Final = 300_000_000
 
 
 class Groups:
@@ -115,22 +118,19 @@ class Groups:
         self._started = self._runtime.monotonic()
         self._run(self.config)
 
-    def hold(self, *, patience_ns: int) -> None:
-        """Receive and publish nothing until `begin`: what is buffered is dropped.
-
-        Reliable subscribers have so many nanoseconds to get what was published last.
-        """
+    def hold(self) -> None:
+        """Receive and publish nothing until `begin`: what is buffered is dropped."""
         self.bindings.hold()
         self._transforms.serve(())
         self._transforms.poll()
         self._loop.call(lambda: self.flush(DropReason.SHUTDOWN)).result()
-        self.wait_until_acknowledged(patience_ns=patience_ns)
+        self.wait_until_acknowledged()
         self.bindings.end_publishers()
         self._end_shared_publishers()
 
-    def wait_until_acknowledged(self, *, patience_ns: int) -> None:
-        """Give reliable subscribers so many nanoseconds to get what was published last."""
-        deadline = self._runtime.monotonic_ns() + patience_ns
+    def wait_until_acknowledged(self) -> None:
+        """Give reliable subscribers a moment to get what was published last."""
+        deadline = self._runtime.monotonic_ns() + _ACKNOWLEDGE_NS
         self.bindings.wait_until_acknowledged(deadline)
         self.bundles.wait_until_acknowledged(deadline)
         self.manifests.wait_until_acknowledged(deadline)

@@ -46,9 +46,6 @@ _ASKED_S = 3.0
 _AFTER_FAILURE_S = 0.1
 _ACTIVE = (Phase.STARTING, Phase.RUNNING, Phase.PAUSED)
 _WITHOUT_GROUPS = (Phase.UNCONFIGURED, Phase.FINALIZED)
-# How long an end waits for reliable subscribers to acknowledge what was published on all outputs. They do so only at
-# the writer's next heartbeat, which may be 3 s away.
-_ACKNOWLEDGE_NS = 300_000_000
 
 
 class Relay:
@@ -241,7 +238,7 @@ class Relay:
 
     def deactivate(self) -> tuple[GroupReport, ...]:
         """Drop what is buffered, stop receiving and publishing; report on each group. On the main thread."""
-        self._groups.hold(patience_ns=_ACKNOWLEDGE_NS)
+        self._groups.hold()
         self._be_inactive()
         return self.evaluate()
 
@@ -376,7 +373,7 @@ class Relay:
             receiving.result()
             self._groups.flush(DropReason.SHUTDOWN)
             with self._bugs.contained("ending the outputs"):
-                self._groups.wait_until_acknowledged(patience_ns=_ACKNOWLEDGE_NS)
+                self._groups.wait_until_acknowledged()
             self.monitor.conclude()
         return () if self._groups.bindings.is_held else self.monitor.reports
 

@@ -30,6 +30,17 @@ both_backends = pytest.mark.parametrize("backend", BACKENDS)
 """For what must be so whichever backend messages pass through."""
 
 
+# Of what fails in a sitecustomize, Python only warns.
+_SITE = """\
+import sys
+if {word!r} in sys.orig_argv:
+    try:
+        exec(open({path!r}).read(), {{}})
+    except Exception as error:
+        sys.exit(repr(error))
+"""
+
+
 class Player:
     """Publishes frames; every call returns when it is done."""
 
@@ -200,8 +211,7 @@ class Stage:
         folder = self.folder / "before"
         folder.mkdir()
         (folder / "statements.py").write_text(statements)
-        text = f"import sys\nif {word!r} in sys.orig_argv: exec(open({str(folder / 'statements.py')!r}).read(), {{}})\n"
-        (folder / "sitecustomize.py").write_text(text)
+        (folder / "sitecustomize.py").write_text(_SITE.format(word=word, path=str(folder / "statements.py")))
         self.environment["PYTHONPATH"] += f":{folder}"
 
     def note_shared_memory(self) -> None:

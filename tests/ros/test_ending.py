@@ -108,9 +108,8 @@ def test_two_signals_of_one_request_end_it_in_order_whoever_has_the_file_read_me
 
 # On a busy machine the collector may take longer to read what was published last than the relay waits for it.
 _PATIENT = """
-from syncrelay.ros import relay
-
-relay._ACKNOWLEDGE_NS *= 200
+from syncrelay.relay import groups
+groups._ACKNOWLEDGE_NS *= 200
 """
 
 
