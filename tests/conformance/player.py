@@ -34,8 +34,8 @@ from tests.simulated.running import Running
 
 _LOG: Final = logging.getLogger("syncrelay")
 _HOUR: Final = 3600 * 10**9
-# Whether a node's name comes before its publishers; and what is said again and again where a script takes long.
-_BY_CHANCE: Final = re.compile("not known yet|no (more )?sets? for ")
+# That Fast DDS hangs; whether a node's name comes before its publishers; what is said again where a script takes long.
+_BY_CHANCE: Final = re.compile("DDS did not let this node go|not known yet|no (more )?sets? for ")
 
 
 class _Running(Running):

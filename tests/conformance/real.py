@@ -20,6 +20,7 @@ from syncrelay.relay.ports import Node, Purpose
 from syncrelay.relay.types import import_type
 from syncrelay.ros.graph import RosGraph
 from syncrelay.ros.joining import joined
+from syncrelay.ros.leaving import is_leaving
 from syncrelay.ros.qos import to_rclpy
 from syncrelay.runtime import SYSTEM
 from tests.conformance.player import play
@@ -224,17 +225,20 @@ def real_world(folder: Path) -> Iterator[RealWorld]:
 
 
 def serve(asked: Connection, folder: Path) -> None:
-    """Play scripts in a process of their own: by their titles, with folders for their files, until None comes."""
+    """Play scripts in a process of their own: by their titles, with folders for their files, until None comes.
+
+    Each answer comes with whether it is the last. The next script may not see what hangs in Fast DDS.
+    """
     with real_world(folder) as world:
         while (words := asked.recv()) is not None:
             title, own = words
             script = next(each for each in SCRIPTS if each.title == title)
             try:
-                answer: Any = play(script, world, own)
-                world.clear()
+                answer = play(script, world, own)
+                if not is_leaving():
+                    world.clear()
+                asked.send((answer, is_leaving()))
             except Exception:  # noqa: BLE001  it is raised where the test can see it
-                # What goes on in other threads tells why something does not end; nothing is known of what is left.
+                # What goes on in other threads tells why something does not end.
                 faulthandler.dump_traceback()
-                asked.send(traceback.format_exc())
-                return
-            asked.send(answer)
+                asked.send((traceback.format_exc(), True))

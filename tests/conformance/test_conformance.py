@@ -11,6 +11,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from syncrelay.fastdds_files import held_by, remove_unused
 from tests.conformance.player import play
 from tests.conformance.real import serve
 from tests.conformance.script import MARKER, TF, Script
@@ -18,7 +19,6 @@ from tests.conformance.scripts import SCRIPTS
 from tests.conformance.seen import KNOWN, Seen, told
 from tests.conformance.simulated import SimulatedWorld
 from tests.faults.extent import IS_LONG
-from tests.ros.processes import DEADLINE_S
 from tests.ros.stage import IS_COMPILED
 
 if TYPE_CHECKING:
@@ -54,16 +54,9 @@ def _as_far_as_told(script: Script, seen: Seen, expected: Seen) -> Seen:
 
 @pytest.fixture(scope="module")
 def real(tmp_path_factory) -> Iterator[Callable[[Script, Path], Seen]]:
-    """Plays a script on real DDS, in a process for all of them; after one that fails in a new one."""
+    """Plays a script on real DDS, in a process for all of them until one leaves something behind."""
     spawn = multiprocessing.get_context("spawn")
     playing: list[tuple[Connection, SpawnProcess]] = []
-
-    def end() -> None:
-        ours, process = playing.pop()
-        if process.is_alive():
-            ours.send(None)
-        process.join(DEADLINE_S)
-        process.kill()
 
     def played(script: Script, folder: Path) -> Seen:
         if not playing:
@@ -73,17 +66,22 @@ def real(tmp_path_factory) -> Iterator[Callable[[Script, Path], Seen]]:
             # So that what it says ends with it.
             theirs.close()
             playing.append((ours, process))
-        ours, _ = playing[-1]
+        ours, process = playing[-1]
         ours.send((script.title, folder))
-        answer = ours.recv()
-        if not isinstance(answer, Seen):
-            end()
+        answer, is_last = ours.recv()
+        if is_last:
+            playing.clear()
+            held = held_by(process.pid or 0)
+            process.kill()
+            process.join()
+            remove_unused(held)
         assert isinstance(answer, Seen), answer
         return answer
 
     yield played
-    if playing:
-        end()
+    for ours, process in playing:
+        ours.send(None)
+        process.join()
 
 
 @pytest.mark.long
