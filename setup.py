@@ -9,7 +9,7 @@ from setuptools.command.build_ext import build_ext
 from setuptools.errors import BaseError, CCompilerError
 
 _SOURCE = Path("syncrelay/ros/compiled/path.pyx")
-_INCLUDED = [_SOURCE.with_name(name) for name in ("lent.pxi", "searched.pxi")]
+_INCLUDED = sorted(_SOURCE.parent.glob("*.pxi"))
 _FINGERPRINT = hashlib.sha256(b"".join(each.read_bytes() for each in (_SOURCE, *_INCLUDED))).hexdigest()
 
 

@@ -6,7 +6,6 @@ from pathlib import Path
 
 def source_fingerprint() -> str | None:
     """What `path.SOURCE` is if it was built from the source beside it; None where no source is installed."""
-    sources = [Path(__file__).with_name(name) for name in ("path.pyx", "lent.pxi", "searched.pxi")]
-    if not all(each.exists() for each in sources):
-        return None
-    return hashlib.sha256(b"".join(each.read_bytes() for each in sources)).hexdigest()
+    source = Path(__file__).with_name("path.pyx")
+    sources = [source, *sorted(source.parent.glob("*.pxi"))]
+    return hashlib.sha256(b"".join(each.read_bytes() for each in sources)).hexdigest() if source.exists() else None
