@@ -78,10 +78,6 @@ def clock_drift(facts: GroupFacts) -> Found:
     known = _drifts(facts)
     if not known:
         return
-    slopes = [each.slope for each in known.values()]
-    if (max(slopes) - min(slopes)) * max([each.watched_ns for each in known.values()]) < _DRIFTED:
-        # As nearly always: none drifted farther from another.
-        return
     between = _between(known)
     most = max(abs(each.slope) for each in between.values())
     # Of those that are as far from the others, the one whose stamps run least like this machine's clock.

@@ -295,7 +295,7 @@ def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Fault | None
             absence(facts, an_input),
             input=index,
         )
-    if not _is_silent(facts, an_input, quiet) or (facts.is_held(index) and _is_enough(facts, an_input)):
+    if not _is_silent(facts, an_input, quiet) or (facts.is_held(index) and _is_enough(facts, an_input, quiet)):
         return None
     if DropReason.MALFORMED in figures.dropped:
         # Messages come, of which none can be read.
@@ -334,13 +334,12 @@ def _is_there(facts: GroupFacts, an_input: InputFacts, quiet: int) -> str:
     )
 
 
-def _is_enough(facts: GroupFacts, an_input: InputFacts) -> bool:
+def _is_enough(facts: GroupFacts, an_input: InputFacts, quiet: int) -> bool:
     """Whether an input whose latest message serves on sends when it has something to say, as a map: once, or at odds.
 
     One that has always come more often than that has died, and what is held of it is old.
     """
-    now, figures = facts.figures.now, an_input.figures
-    quiet = now - (figures.last_received or now)
+    figures = an_input.figures
     return not facts.is_silent and (not figures.usual_hz or quiet < _PAUSES * figures.longest_pause)
 
 

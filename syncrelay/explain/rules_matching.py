@@ -229,9 +229,7 @@ def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) ->
     # A slow optional input can be in no more sets than it has messages, and one may still be on its way.
     could_hz = min(rate_hz, pace_hz or rate_hz)
     had_hz = (1 - missing) * rate_hz + 2 * SECOND / _WATCHED
-    if missing <= _MISSING or had_hz >= (1 - _MISSING) * could_hz:
-        return
-    if missing * facts.figures.sets_since_without[index] >= _BACK:
+    if had_hz >= (1 - _MISSING) * could_hz or missing * facts.figures.sets_since_without[index] >= _BACK:
         return
     waits = f" after waiting {words.duration(facts.max_wait)} for it" if facts.max_wait else ""
     must = 1 - could_hz / rate_hz
@@ -267,14 +265,13 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
         )
     if (narrow := over_tolerances(facts, index)) is not None:
         return f": {narrow}", _tolerance_advice(facts, index)
+    advice = _advice(facts, _verdict(facts, about, lambda trials: trials.verdict(index, _WAITING)), name)
     if facts.max_wait is not None and behind > facts.max_wait:
-        found = _verdict(facts, about, lambda trials: trials.verdict(index, _WAITING))
         return (
             f": it arrives {words.duration(behind)} after the others, too late",
-            f"check what delays {name}{_or(_advice(facts, found, name))}",
+            f"check what delays {name}{_or(advice)}",
         )
-    found = _verdict(facts, about, lambda trials: trials.verdict(index, _WAITING))
-    return "", _advice(facts, found, name) or f"check whether messages of {name} arrive late or are lost"
+    return "", advice or f"check whether messages of {name} arrive late or are lost"
 
 
 def _in_time(index: int, trials: Trials) -> Verdict:
@@ -337,7 +334,7 @@ def _longest_pause(an_input: InputFacts, absent: int) -> int:
     A pause is as long as several usual periods: messages that are lost one by one seldom leave one.
     """
     figures = an_input.figures
-    if figures.longest_pause < _PAUSE:
+    if not figures.gaps:
         return 0
     # Where most come at once, any pause is longer than is usual.
     usual = round(SECOND / figures.pace_hz) if figures.pace_hz else max(1, median_low(figures.gaps))

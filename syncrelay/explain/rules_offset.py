@@ -1,12 +1,13 @@
 """The finding that stamps of an input are off by a constant, so that sets hold messages of different moments."""
 
+from statistics import median_low
 from typing import Final
 
 import numpy as np
 
 from syncrelay.explain import words
 from syncrelay.explain.codes import Code
-from syncrelay.explain.facts import GroupFacts
+from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Fault, Found, nodes
 from syncrelay.explain.nearest import quantile, shifted, signed_distances
 from syncrelay.explain.rules_stamps import offered_offset, other_clock
@@ -38,8 +39,7 @@ def constant_offset(facts: GroupFacts) -> Found:
         if (off := _whole_periods_off(facts, first, other)) is None:
             continue
         # The one that is farther from this machine's time is odd.
-        delays = {index: facts.inputs[index].figures.delay or 0 for index in (first, other)}
-        odd, right = sorted(delays, key=lambda index: -abs(delays[index] - facts.inputs[index].offset))
+        odd, right = sorted((first, other), key=lambda index: -abs(_late_by(facts.inputs[index])))
         off = off if odd == other else -off
         name = facts.inputs[odd].name
         advice = offered_offset(facts, Code.CONSTANT_OFFSET, odd, facts.inputs[odd].offset - off)
@@ -73,15 +73,19 @@ def _whole_periods_off(facts: GroupFacts, first: int, other: int) -> int | None:
     if quantile(signed, 0.95) - quantile(signed, 0.05) > _SCATTERS * period:
         return None
     distance = quantile(signed, 0.5)
-    later = (two.figures.delay or 0) - two.offset - (one.figures.delay or 0) + one.offset
-    apart = distance + later
+    delays = _late_by(one), _late_by(two)
+    apart = distance + delays[1] - delays[0]
     whole = round(apart / period)
-    delay = max((two.figures.delay or 0) - two.offset, (one.figures.delay or 0) - one.offset, key=abs)
     # Results that take long have the stamps of what they are of. None is stamped before its time, but a simulated clock
     # comes in ticks, and is up to one behind.
-    is_ahead = facts.clock is None and delay <= -_AHEAD * period
+    is_ahead = facts.clock is None and max(delays, key=abs) <= -_AHEAD * period
     may_be_result = not is_ahead and abs(distance) < _OFF * period
     near = _WHOLE_AHEAD if is_ahead else _WHOLE
     if not whole or may_be_result or abs(apart - whole * period) > near * period:
         return None
     return round(distance - whole * period)
+
+
+def _late_by(an_input: InputFacts) -> int:
+    """Return how long after its stamp, offset added, a message usually comes."""
+    return median_low(an_input.figures.delays) - an_input.offset

@@ -239,7 +239,7 @@ def several_publishers(facts: GroupFacts, index: int, an_input: InputFacts) -> F
         return
     disorder = figures.out_of_order + (0 if facts.is_held(index) else figures.duplicates) if facts.by_stamp else 0
     # Whatever messages are matched by, it begins anew when stamps fall.
-    if figures.swings >= _FEWEST_SWINGS:
+    if swings(an_input):
         conflict = f"their stamps are {words.span_of_time(figures.swung_by)} apart"
     elif disorder > _FAULTY * figures.fed:
         conflict = f"{counted(disorder, figures.fed)} messages repeat a stamp or arrived out of stamp order"
@@ -251,7 +251,7 @@ def several_publishers(facts: GroupFacts, index: int, an_input: InputFacts) -> F
         f"{who} publish {an_input.name}: {conflict}",
         "give each publisher its own topic, or stop all but one",
         blocks(facts, an_input),
-        explains=figures.swings >= _FEWEST_SWINGS or _matters(facts, an_input, disorder),
+        explains=swings(an_input) or _matters(facts, an_input, disorder),
     )
 
 
@@ -341,7 +341,7 @@ def time_jump(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     now, figures = facts.figures.now, an_input.figures
     if figures.reading is not None:
         return
-    if facts.by_stamp and figures.swings >= _FEWEST_SWINGS:
+    if facts.by_stamp and swings(an_input):
         yield Fault(
             f"timestamps of {an_input.name} jump back and forth by {words.span_of_time(figures.swung_by)}",
             f"check whether {nodes(an_input)} stamps by two clocks, or two nodes publish {an_input.name}",
