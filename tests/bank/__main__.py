@@ -1,7 +1,8 @@
 """Draws faults by seed, and prints how each kind is told: `python -m tests.bank --draws 2000 --seed 1`.
 
 `--show SEED` prints what a draw is, and what was said when. `--known > tests/bank/known.txt` writes down what is said
-of draws with fixed seeds: read what has changed before you keep it.
+of draws with fixed seeds, `--limits known > tests/bank/limits.txt` where it becomes another: read what has changed
+before you keep it. `--limits drawn` looks for limits anew.
 """
 
 import argparse
@@ -14,6 +15,7 @@ from typing import NamedTuple
 
 from tests.bank.kinds import KINDS
 from tests.bank.known import fixed, known
+from tests.bank.limits import drawn_limits, known_limits
 from tests.bank.mended import mended
 from tests.bank.play import Score, described, drawn, play
 
@@ -51,9 +53,14 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--show", type=int, help="print one draw, and what was said of it")
     parser.add_argument("--known", action="store_true", help="print what is known of fixed draws")
+    parser.add_argument("--limits", choices=["known", "drawn"], help="print where what is said becomes another")
     asked = parser.parse_args()
     if asked.known:
         _say("\n\n".join(map(known, fixed())))
+        return 0
+    if asked.limits is not None:
+        for limit in known_limits() if asked.limits == "known" else drawn_limits():
+            _say(limit.line())
         return 0
     kinds = tuple(asked.kinds.split(","))
     if asked.show is not None:

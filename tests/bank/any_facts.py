@@ -4,10 +4,8 @@ No rig is played, so thousands are judged in a second; and what no rig comes to,
 """
 
 import random
-import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields, is_dataclass, replace
-from functools import partial
 from typing import Any, Final, TypeAlias
 
 from syncrelay.config import Tolerance
@@ -30,11 +28,11 @@ from syncrelay.explain.summary import summarize
 from syncrelay.explain.troubles import troubles
 from syncrelay.status.as_document import group_of
 from syncrelay.sync.messages import DropReason
+from tests.bank.dials import Dial
 from tests.explain.support import cases_flow, cases_graph, cases_stamps, cases_transforms
 from tests.explain.support.groups import BEGAN, MS, S
 
 Pool: TypeAlias = dict[tuple[type, str], list[Any]]
-_Dial: TypeAlias = tuple[Callable[[Any], Any], Any, Any]
 
 _CASES: Final = [
     facts
@@ -56,10 +54,8 @@ _COUNTS: Final = (0, 1, 2, 3, 4, 5, 9, 10, 11, 19, 20, 50, 94, 95, 99, 100)
 _LOOKS: Final = 6
 _MOST: Final = 6
 _CHANGES: Final = 0.3
-_DIALS: Final = 60
+_BACK: Final = 0.3
 _DEEPER: Final = 0.8
-_CODE: Final = re.compile(r"<(\w+)>")
-_FIGURE: Final = re.compile(r"-?\d[\d.e-]* ?\w*")
 # As long as another, and what is no more than a few: the index of an input.
 _AS_LONG: Final = frozenset({"missing", "sets_since_without", "spans", "latencies"})
 _AS_IN_CASES: Final = frozenset({"trigger", "pacemaker", "unsteady", "every", "name", "required"})
@@ -111,55 +107,51 @@ def said_of(chance: random.Random) -> Iterator[tuple[str, str]]:
         yield from (("", str(each)) for each in troubles([*zip(groups, found, strict=True)], causes.published_by))
 
 
-def at_limits(chance: random.Random) -> Iterator[tuple[str, str]]:
-    """Yield where what is said becomes another while one number goes from what it is to another, and all that is said.
-
-    Of what is near to a limit, nothing but the limit itself tells which side of it is which.
-    """
+def dial_of_facts(chance: random.Random) -> Dial | None:
+    """Return what is said of a group by one of the numbers that are known of it."""
     facts = _some_changed(chance.choice(_CASES), chance)
     before = chance.choice([None, facts, _some_changed(facts, chance)])
     facts = _goes_on(facts, chance.choice([0, S, 5 * S, 20 * S]))
-    for _ in range(_DIALS):
-        if (dial := _dial(facts, chance)) is not None:
-            turned, low, high = dial
-            said = around_a_limit(partial(_said_with, before, turned), low, high)
-            yield from (("", each) for each in said)
-            yield from ((code, "") for code in _CODE.findall("".join(said[:1])))
+    if (dial := _dial(facts, chance)) is None:
+        return None
+    looks = [] if before is None else [before]
+    return dial._replace(said=lambda number: _all_said([*looks, dial.said(number)]))
 
 
-def around_a_limit(said: Callable[[Any], str], low: Any, high: Any) -> list[str]:
-    """Return what is said of two numbers next to each other, between which the words change; nothing if they do not."""
-    words = _without_figures(said(low))
-    if words == _without_figures(said(high)):
-        return []
-    while (middle := (low + high) / 2 if isinstance(low + high, float) else (low + high) // 2) not in (low, high):
-        if _without_figures(said(middle)) == words:
-            low = middle
-        else:
-            high = middle
-    return [f"{each} {said(each)}" for each in (low, high)]
+def dial_of_looks(chance: random.Random) -> Dial:
+    """Return what is said of a group look by look, by how much later some looks are."""
+    facts = _some_changed(chance.choice(_CASES), chance)
+    looks = [facts]
+    for _ in range(chance.randint(1, _LOOKS)):
+        step: Callable[[GroupFacts, int], Any] = chance.choice([_waits, _goes_on, _goes_on])
+        changed = _some_changed(looks[-1], chance) if chance.random() < _CHANGES else looks[-1]
+        if chance.random() < _BACK:
+            changed = _goes_on(facts, changed.figures.now - facts.figures.now)
+        looks.append(step(changed, chance.choice([S, S, 2 * S, 5 * S, 10 * S, 30 * S])))
+    first, later = chance.randrange(len(looks)), chance.choice([_waits, _goes_on])
+
+    def said(by: int) -> str:
+        moved = [later(each, by) if place == first else _goes_on(each, by) for place, each in enumerate(looks[first:])]
+        return _all_said([*looks[:first], *moved])
+
+    return Dial(later.__name__.removeprefix("_"), said, 0, chance.choice([5, 20, 70, 700]) * S)
 
 
-def _said_with(before: GroupFacts | None, turned: Callable[[Any], GroupFacts], number: Any) -> str:
-    return _all_said(before, turned(number))
+def _all_said(looks: Iterable[GroupFacts]) -> str:
+    """Return all that is said of a group at the last look, and logged at any."""
+    judge, log, causes, said, logged = Judge(), FindingLog(), CauseLog(), list[str](), list[str]()
+    for facts in looks:
+        causes.watch([facts.name])
+        found, now = judge.judge(facts), facts.figures.now
+        remarks = [*log.remarks(facts, found, judge.explained(facts))]
+        causes.hear(facts, found, remarks, now=now)
+        said = [f"<{one.code.value}> {one}" for one in with_ok(facts, found)]
+        logged += [*map(str, remarks), *(line.text for line in causes.lines(now=now))]
+    return "\n".join([*said, *logged, *(f"{each.lasted} {each.text}" for each in log.spells)])
 
 
-def _all_said(before: GroupFacts | None, facts: GroupFacts) -> str:
-    """Return all that is said of a group, after a look at what it was before."""
-    judge, log, said = Judge(), FindingLog(), []
-    for each in [facts] if before is None else [before, facts]:
-        found = judge.judge(each)
-        said = [f"<{one.code.value}> {one}" for one in with_ok(each, found)]
-        said += [str(remark) for remark in log.remarks(each, found, judge.explained(each))]
-    return "\n".join([*said, *(f"{each.lasted} {each.text}" for each in log.spells)])
-
-
-def _without_figures(text: str) -> str:
-    return _FIGURE.sub("", text)
-
-
-def _dial(value: Any, chance: random.Random) -> _Dial | None:
-    """Return how a record is with another of the numbers in it, that number, and another; None of what has none.
+def _dial(value: Any, chance: random.Random) -> Dial | None:
+    """Return a record by one of the numbers in it, that number, and another; None of what has none.
 
     Of many, some or all are moved together.
     """
@@ -175,15 +167,16 @@ def _dial(value: Any, chance: random.Random) -> _Dial | None:
     by = chance.choice([-1, 1]) * chance.choice(_ROUND)
     match part:
         case int() | float():
-            return put, part, _number_near(part, chance)
+            return Dial(name, put, part, _number_near(part, chance))
         case Distribution():
-            kept = part.newest(len(part))
-            return lambda more: put(Distribution([each + more for each in kept])), 0, by
+            kept = part.newest(len(part))[::-1]
+            return Dial(name, lambda more: put(Distribution([each + more for each in kept])), 0, by)
         case [int(), *_] if not hasattr(part, "_fields"):
             at = chance.randrange(len(part))
             among = chance.choice([range(len(part)), range(at, len(part)), [at]])
             moved = [place in among and isinstance(each, int) for place, each in enumerate(part)]
-            return (
+            return Dial(
+                name,
                 lambda more: put(
                     tuple(each + more if is_of else each for each, is_of in zip(part, moved, strict=True))
                 ),
@@ -195,7 +188,7 @@ def _dial(value: Any, chance: random.Random) -> _Dial | None:
             inner, put_inner = _dial(part[at], chance), lambda new: put((*part[:at], new, *part[at + 1 :]))
         case _:
             inner, put_inner = _dial(part, chance), put
-    return inner and (lambda number: put_inner(inner[0](number)), *inner[1:])
+    return inner and Dial(f"{name}.{inner.what}", lambda number: put_inner(inner.said(number)), inner.low, inner.high)
 
 
 def _has_numbers(value: Any) -> bool:
@@ -234,7 +227,8 @@ def _some_changed(facts: GroupFacts, chance: random.Random) -> GroupFacts:
         facts = _changed(facts, chance)
     if not any(each.required for each in facts.inputs):
         facts = replace(facts, inputs=(replace(facts.inputs[0], required=True), *facts.inputs[1:]))
-    return facts
+    # Those of a case with more inputs.
+    return replace(facts, lapses=tuple(each for each in facts.lapses if each.input < len(facts.inputs)))
 
 
 def _changed(value: Any, chance: random.Random) -> Any:

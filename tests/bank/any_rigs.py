@@ -5,9 +5,9 @@ with a limit is often equal to it. What is suggested is tried on the last messag
 """
 
 import random
-from collections.abc import Callable, Iterator
-from dataclasses import fields
-from functools import partial
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import fields, replace
 from typing import Any, Final
 
 from syncrelay.config import ConfigError, GroupConfig
@@ -17,15 +17,26 @@ from syncrelay.explain.input_observation import InputObservation
 from syncrelay.explain.nearest import as_arrays
 from syncrelay.explain.trials import Trials
 from syncrelay.sync import Message
-from tests.bank.any_facts import around_a_limit
+from tests.bank.dials import Dial
 from tests.explain.scenario import BEGAN, MS, S, Source, group_of, run
 
 Hears = Callable[[float, GroupFacts, tuple[Finding, ...], list[Remark]], None]
 Came = list[tuple[float, int | None]]
 
-# Of an input alone so many seconds are observed, with so many of its messages moved.
+# Of an input alone so many seconds are observed.
 _OBSERVED_S: Final = 20
-_MOVES: Final = 3
+# What may be moved: stamps, times of receipt or both, all by as much, or each by more than the one before it.
+_MOVES: Final = {
+    "stamps": (1, 0, False),
+    "received": (0, 1, False),
+    "messages": (1, 1, False),
+    "pace_of_stamps": (1, 0, True),
+    "pace": (1, 1, True),
+}
+# A rig at a limit is played for so many seconds.
+_SHORT_S: Final = 12
+# A figure below this may be a count.
+_FEW: Final = 300
 # The messages themselves.
 _MANY: Final = frozenset({"stamps", "received", "delays", "nearest"})
 # By how much stamps are off: little, by some periods, or as those of another clock are.
@@ -81,21 +92,19 @@ _BESIDE: Final[tuple[dict[str, Any], ...]] = (
     {"sleeps": [(6, 9)]},
 )
 
+_BESIDE_SHORT: Final[tuple[dict[str, Any], ...]] = (
+    {},
+    {},
+    {"stops": [(3.5, 5.0)]},
+    {"paused": [(3.0, 5.0)]},
+    {"sleeps": [(2, 4)]},
+)
+
 
 def played(chance: random.Random, hears: Hears) -> None:
     """Play such a rig, and tell of each look at it."""
-    while True:
-        sources = [_source(f"/t{number}", chance) for number in range(chance.choice([2, 2, 3, 4]))]
-        options = {
-            "queue_size": chance.choice([1, 2, 4, 10, 10, 30]),
-            **chance.choice(_KEYS),
-            **chance.choice(_MORE_KEYS),
-        }
-        try:
-            group = group_of(sources, options)
-        except ConfigError:
-            continue
-        break
+    sources, options = _rig(chance)
+    group = group_of(sources, options)
     run(
         *sources,
         seconds=chance.choice([12, 20, 32]),
@@ -106,28 +115,81 @@ def played(chance: random.Random, hears: Hears) -> None:
     )
 
 
-def observed(chance: random.Random) -> Iterator[tuple[str, str]]:
-    """Yield what is observed of one input, where that becomes another as some of its stamps or arrivals are moved."""
+def _rig(chance: random.Random) -> tuple[list[Source], dict[str, Any]]:
+    """Draw sources and what is asked of them, as far as that goes together."""
+    while True:
+        sources = [_source(f"/t{number}", chance) for number in range(chance.choice([2, 2, 3, 4]))]
+        options = {
+            "queue_size": chance.choice([1, 2, 4, 10, 10, 30]),
+            **chance.choice(_KEYS),
+            **chance.choice(_MORE_KEYS),
+        }
+        with suppress(ConfigError):
+            group_of(sources, options)
+            return sources, options
+
+
+def dial_of_input(chance: random.Random) -> Dial | None:
+    """Return what is observed of one input, by how far some of its stamps or arrivals are moved, or by their pace."""
     came = [(stamp, BEGAN + round(at * S)) for at, stamp in _came(chance) if stamp is not None and at < _OBSERVED_S]
-    for _ in range(_MOVES):
-        first, after = sorted(chance.sample(range(len(came) + 1), 2)) if came else (0, 0)
-        after = chance.choice([first + 1, after, len(came)])
-        seen = partial(_observed, came, slice(first, after), chance.choice([(1, 0), (0, 1)]))
-        high = chance.choice([-1, 1]) * chance.choice([20 * MS, 150 * MS, S, 7 * S, 20 * S, 90_000 * S])
-        yield from (("changes", each) for each in around_a_limit(seen, 0, high))
+    if not came:
+        return None
+    what, moves = chance.choice([*_MOVES.items()])
+    first, after = sorted(chance.sample(range(len(came) + 1), 2))
+    some = slice(first, chance.choice([first + 1, after, len(came)]))
+    high = chance.choice([-1, 1]) * chance.choice([20 * MS, 150 * MS, S, 7 * S, 20 * S, 90_000 * S])
+    return Dial(what, lambda by: _observed(_moved(came, some, moves, by)), 0, high)
 
 
-def _observed(came: list[tuple[int, int]], some: slice, moves: tuple[int, int], by: int) -> str:
-    """Return what an input's figures are at each second, with some of its stamps or times of receipt moved."""
-    moved = [(stamp + moves[0] * by, at + moves[1] * by) for stamp, at in came[some]]
-    came = sorted([*came[: some.start], *moved, *came[some.stop :]], key=lambda each: each[1])
+def _moved(came: list[tuple[int, int]], some: slice, moves: tuple[int, int, bool], by: int) -> list[tuple[int, int]]:
+    """Return messages of which some are stamped or received later, or each later than the one before it."""
+    stamps, received, is_pace = moves
+    last = max(1, len(came[some]) - 1)
+    later = [by * place // last if is_pace else by for place in range(len(came[some]))]
+    moved = [(stamp + stamps * more, at + received * more) for (stamp, at), more in zip(came[some], later, strict=True)]
+    return sorted([*came[: some.start], *moved, *came[some.stop :]], key=lambda each: each[1])
+
+
+def _observed(came: list[tuple[int, int]]) -> str:
+    """Return what an input's figures are at each second."""
     input_seen, figures = InputObservation(), list[str]()
     for now in range(BEGAN + S, BEGAN + (_OBSERVED_S + 3) * S, S):
         input_seen.add([each for each in came if now - S < each[1] <= now])
         fed = sum(now - 10 * S < received <= now for _, received in came)
         seen = input_seen.figures(fed=fed, dropped={}, seconds=min(10.0, (now - BEGAN) / S), now=now)
-        figures.append(str([getattr(seen, each.name) for each in fields(seen) if each.name not in _MANY]))
+        figures.append(str([_shown(getattr(seen, each.name)) for each in fields(seen) if each.name not in _MANY]))
     return "\n".join([*figures, str(input_seen.pace)])
+
+
+def _shown(value: Any) -> Any:
+    """Return a value; of a count strokes, as it is by no figure that another is as great."""
+    return "|" * value if isinstance(value, int) and not isinstance(value, bool) and 0 < value < _FEW else value
+
+
+def dial_of_rig(chance: random.Random) -> Dial:
+    """Return what is seen and said of a short rig, by how far some messages of one of its inputs are moved."""
+    sources, options = _rig(chance)
+    beside, moved = chance.choice(_BESIDE_SHORT), chance.choice(sources)
+    sent = moved.messages() if moved.messages else ()
+    came = [(0 if stamp is None else stamp, BEGAN + round(at * S)) for at, stamp in sent if at < _SHORT_S]
+    what, moves = chance.choice([*_MOVES.items()])
+    first, after = sorted(chance.sample(range(len(came) + 1), 2)) if came else (0, 0)
+    some = slice(first, chance.choice([first + 1, after, len(came)]))
+
+    def said(by: int) -> str:
+        later = [((at - BEGAN) / S, stamp or None) for stamp, at in _moved(came, some, moves, by)]
+        found = list[str]()
+
+        def hears(_second: float, facts: GroupFacts, findings: tuple[Finding, ...], remarks: list[Remark]) -> None:
+            share = facts.figures.share
+            counts = [share.left, share.possible, share.absent, *facts.figures.sets_since_without]
+            found.append(f"{findings} {remarks} {facts.standing} {share} {[*map(_shown, counts)]}")
+
+        others = [replace(each, messages=lambda: later) if each is moved else each for each in sources]
+        run(*others, seconds=_SHORT_S, options=options, hears=hears, **beside)
+        return "\n".join(found)
+
+    return Dial(what, said, 0, chance.choice([-1, 1]) * chance.choice([20 * MS, 150 * MS, S, 7 * S]))
 
 
 def _source(topic: str, chance: random.Random) -> Source:

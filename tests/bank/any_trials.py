@@ -12,6 +12,7 @@ from syncrelay.explain.nearest import as_arrays
 from syncrelay.explain.other_stamps import by_other_stamps, wandering
 from syncrelay.explain.trials import REQUIRED, Trials
 from syncrelay.sync import Message
+from tests.bank.dials import Dial
 from tests.explain.scenario import BEGAN, IMU, MS, S
 from tests.ros.configs import config
 
@@ -75,19 +76,39 @@ def _any_numbers(chance: random.Random) -> Came:
 
 def answers(chance: random.Random) -> Iterator[tuple[str, str]]:
     """Yield what trials answer to all that may be asked of them, with whether a value was found that helps."""
-    yield from (("helps" if "Tried(" in text else "does not help", text) for text in _answers(chance))
-
-
-def _answers(chance: random.Random) -> Iterator[str]:
     group, came = any_trials(chance)
+    texts = (text for is_window in (True, False) for text in _answers(group, came, is_window=is_window))
+    yield from (("helps" if "Tried(" in text else "does not help", text) for text in texts)
+
+
+def dial_of_trials(chance: random.Random) -> Dial | None:
+    """Return what trials answer, by how far some messages of one input are moved."""
+    group, came = any_trials(chance)
+    index, is_window = chance.randrange(len(came)), chance.random() < 0.7
+    if not came[index]:
+        return None
+    what, (of_stamps, of_receipt) = chance.choice([("stamps", (1, 0)), ("received", (0, 1)), ("messages", (1, 1))])
+    first, after = sorted(chance.sample(range(len(came[index]) + 1), 2))
+    some = chance.choice([range(first, after), range(len(came[index]))])
+
+    def said(by: int) -> str:
+        moved = [
+            (max(-_LAST, min(_LAST, stamp + of_stamps * by)), at + of_receipt * by) if place in some else (stamp, at)
+            for place, (stamp, at) in enumerate(came[index])
+        ]
+        return "\n".join(_answers(group, [*came[:index], moved, *came[index + 1 :]], is_window=is_window))
+
+    return Dial(what, said, 0, chance.choice([-1, 1]) * chance.choice([5 * MS, 20 * MS, 200 * MS, 2 * S]))
+
+
+def _answers(group: GroupConfig, came: list[Came], *, is_window: bool) -> Iterator[str]:
     messages = [Message(index, *each) for index, of_input in enumerate(came) for each in of_input]
     messages.sort(key=lambda each: each.payload)
-    for is_window in (True, False):
-        trials = Trials(group, lambda: messages, as_arrays(messages, len(came)), is_window=is_window)
-        yield str(trials.plan)
-        for target in (REQUIRED, *trials.optional):
-            yield str([trials.verdict(target, _KEYS), [trials.verdict(target, {key}) for key in _KEYS]])
-            for index in range(len(came)):
-                yield str([by_other_stamps(trials, index, target), wandering(trials, index)])
-        offsets = [*trials.offsets(), *filter(None, map(trials.clock_offset, range(len(came))))]
-        yield str([(offset, trials.by_offset(offset)) for offset in offsets])
+    trials = Trials(group, lambda: messages, as_arrays(messages, len(came)), is_window=is_window)
+    yield str(trials.plan)
+    for target in (REQUIRED, *trials.optional):
+        yield str([trials.verdict(target, _KEYS), [trials.verdict(target, {key}) for key in _KEYS]])
+        for index in range(len(came)):
+            yield str([by_other_stamps(trials, index, target), wandering(trials, index)])
+    offsets = [*trials.offsets(), *filter(None, map(trials.clock_offset, range(len(came))))]
+    yield str([(offset, trials.by_offset(offset)) for offset in offsets])

@@ -19,8 +19,8 @@ from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.troubles import troubles
 from syncrelay.status.as_document import group_of
 from tests.bank.any_arrivals import judged
-from tests.bank.any_facts import at_limits, said_of
-from tests.bank.any_rigs import observed, played
+from tests.bank.any_facts import said_of
+from tests.bank.any_rigs import played
 from tests.bank.any_trials import answers
 from tests.bank.kinds import KINDS
 from tests.bank.play import Drawn, drawn, publishers_of
@@ -185,10 +185,8 @@ def _played(chance: random.Random) -> Iterator[tuple[str, str]]:
 
 _WITHOUT_A_RIG: Final = {
     "facts": said_of,
-    "limits": at_limits,
     "trials": answers,
     "arrivals": _seen,
-    "observed": observed,
     "rigs": _played,
 }
 
