@@ -3,7 +3,7 @@
 import pytest
 
 from syncrelay.explain import ClockState, Code, Finding, Severity, explanation, judge, with_ok
-from syncrelay.explain.causes import EXPLAINS
+from syncrelay.explain.causes import EXPLAINS, explained_by
 from syncrelay.sync.messages import DropReason
 from tests.explain.support import cases_flow, cases_graph, cases_stamps, cases_transforms
 from tests.explain.support.cases import STRANGER, UNFIT, camera, fed, said_of_cases
@@ -91,3 +91,13 @@ def test_an_explanation_is_the_first_of_the_worst():
     )
     assert explanation((ok, warn, error, worse)) is error
     assert explanation((ok, warn)) is warn
+
+
+def test_no_finding_explains_itself_by_way_of_others():
+    def walk(code, path):
+        assert code not in path, [*path, code]
+        for other in explained_by(code):
+            walk(other, [*path, code])
+
+    for code in EXPLAINS:
+        walk(code, [])

@@ -78,16 +78,6 @@ def test_the_distance_to_the_nearest_of_others_is_known_of_what_lies_among_them(
     assert signed_distances(np.array(stamps), np.array(others)).tolist() == nearest
 
 
-def test_a_message_is_in_one_possible_set_at_most_the_tightest():
-    slow, fast = [*range(0, 1000, 100), 503], [at + 2 for at in range(0, 1000, 50)]
-    came = sorted([(at, 0) for at in slow] + [(at, 1) for at in fast])
-    messages = [Message(index, BEGAN + at * MS, BEGAN + at * MS) for at, index in came]
-    group = group_of([Source("/slow", 1), Source("/fast", 1)], {"policy": "approximate_time", "slop": "5ms"})
-    found = possible_sets(group, as_arrays(messages, 2), (0, 1), is_window=False)
-    assert found is not None
-    assert ((found.stamps[:] - BEGAN) // MS).tolist() == [at for at in sorted(slow) if at != 500]
-
-
 def test_stamps_of_a_long_recording_are_put_in_order_whatever_their_order_was():
     rng = np.random.default_rng(1)
     stamps = BEGAN + np.arange(5 * BLOCK) * MS + rng.integers(-3, 4, 5 * BLOCK) * MS

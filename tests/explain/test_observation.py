@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from syncrelay.explain.input_observation import InputObservation
 from syncrelay.explain.observation import Observation
-from syncrelay.explain.order import StampOrder
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
 from tests.explain.scenario import Source, group_of
@@ -62,15 +61,6 @@ class Stage:
         return self.observation.figures(now=self.now)[1]
 
 
-def test_stamps_that_repeat_and_fall_a_little_are_counted_while_the_window_lasts():
-    stage = Stage()
-    stage.second([(BEGAN + each * MS, BEGAN + 900 * MS) for each in (500, 500, 600, 550, 590, 700)])
-    assert (stage.inputs[0].duplicates, stage.inputs[0].out_of_order) == (1, 2)
-    for _ in range(10):
-        stage.second(stage.stream(10))
-    assert (stage.inputs[0].duplicates, stage.inputs[0].out_of_order) == (0, 0)
-
-
 def a_set(stage, *, span=5 * MS, latency=MS, second=True):
     return (stage.now, stage.now + span if second else None), latency
 
@@ -103,32 +93,6 @@ def test_spans_of_whole_sets_are_those_of_sets_one_by_one(sets, offsets):
     seen.add([[]] * 3, [(stamps, 0) for stamps in sets], nothing, len(sets), now=BEGAN + S)
     spans = [max(shifted) - min(shifted) for shifted in (list(map(add, stamps, offsets)) for stamps in sets)]
     assert list(seen.figures(now=BEGAN + S)[0].spans.newest(99)) == spans[::-1]
-
-
-def test_nothing_is_left_of_delays_when_this_machines_clock_is_set_back_and_no_stamps_are_set():
-    stage = Stage()
-    stage.second(stage.stream(10))
-    assert stage.inputs[0].delay == 2 * MS
-    stage.second([(0, stage.now - 20 * S)], length=-20 * S)
-    assert (stage.inputs[0].delay, stage.inputs[0].jitter) == (None, None)
-
-
-@pytest.mark.parametrize(
-    ("stamps_ms", "expected"),
-    [
-        ([0, 1400, 2800, 700, 4200, 5600], (1, 1)),
-        ([0, 1400, 2800, 1000, 2400, 3800], (0, 0)),
-        ([0, 1400, 2800, 2100, 4200, 3500], (2, 2)),
-        ([0, 1400, 2800, 2100, 2200, 4200], (2, 1)),
-    ],
-    ids=["late_by_more_than_a_second", "set_back_by_more", "late_twice", "set_back_by_less"],
-)
-def test_what_came_late_is_told_from_a_clock_that_was_set_back(stamps_ms, expected):
-    order = StampOrder()
-    for number, stamp in enumerate(stamps_ms):
-        order.add([BEGAN + stamp * MS], [BEGAN + number * 1400 * MS])
-    lately = order.lately(BEGAN + 8 * S)
-    assert (sum(each.out_of_order for each in lately), sum(each.falls for each in lately)) == expected
 
 
 def test_memory_does_not_grow_with_time():

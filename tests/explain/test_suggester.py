@@ -68,30 +68,6 @@ CAMERA = Source("/camera", hz=10, jitter_ms=0.5)
 LIDAR = Source("/lidar", hz=10, jitter_ms=0.5)
 
 
-def test_an_offset_is_offered_beside_the_slop_where_the_distance_is_constant():
-    told, cured = rig(replace(CAMERA, hz=5, clock=lambda _: -0.08), replace(LIDAR, hz=5), slop="20ms")
-    assert re.search(
-        r"write `slop: 90ms`, which would give (\d+) of (\d+) possible sets \(now 0\), or, if both are measured at the"
-        r" same time, `offset: 80ms` at /camera, which would give \d+$",
-        told.first.text,
-    )
-    assert_cured(cured, offered=2)
-
-
-def test_a_longer_queue_is_offered_for_stamps_that_seem_old_only_if_it_cures():
-    told, _ = rig(CAMERA, replace(LIDAR, delay_ms=2500), slop="20ms", queue_size=5)
-    assert told.codes == {"other_clock"}
-    suggestion = told.found[-1][1][0].suggestion or ""
-    offered = r"if /lidar really takes that long to arrive, write `queue_size: (\d+)`, which would give (\d+) of"
-    ((size, promised),) = re.findall(offered, suggestion)
-    waiting = run(CAMERA, replace(LIDAR, delay_ms=2500), seconds=30, options={"slop": "20ms", "queue_size": int(size)})
-    assert waiting.warnings == []
-    assert waiting.facts.figures.sets >= int(promised)
-    # Stamps that are never within slop are not cured by a queue.
-    apart, _ = rig(replace(CAMERA, phase_ms=50), replace(LIDAR, delay_ms=2500), slop="10ms", queue_size=5)
-    assert "queue_size" not in "".join(each.suggestion or "" for _, found in apart.found for each in found)
-
-
 def test_a_clock_whose_least_delay_decides_what_matches_is_not_offered_to_be_mapped_but_the_delay_is_asked_for():
     """The camera's 7 ms are less than a period of its own and several of the lidar's: nothing shows which of these."""
     quick = Source("/lidar", hz=500, delay_ms=0.5)
@@ -140,16 +116,6 @@ def test_a_slop_is_not_narrowed_to_how_near_mapped_stamps_came():
 
     assert plan(LIDAR) == ["slop"]
     assert plan(replace(LIDAR, topic_options={"clock": "device"})) == []
-
-
-def test_times_of_receipt_are_offered_only_where_they_bring_the_sets():
-    halved = Source("/imu", hz=10, stamp=lambda stamp: BEGAN + (stamp - BEGAN) // 2)
-    told, cured = rig(CAMERA, LIDAR, halved, slop="20ms")
-    assert [values for values, _ in offers(cured[0][0])] == [[("stamp", "receive", "/imu")]]
-    assert_cured(cured, offered=1)
-    late, none = rig(CAMERA, LIDAR, replace(halved, delay_ms=45), slop="20ms")
-    assert late.codes == told.codes
-    assert none == []
 
 
 def a_suggester(budget: TryBudget | None = None) -> Suggester:
