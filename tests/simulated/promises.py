@@ -67,6 +67,8 @@ _SUBSCRIBES_AGAIN: Final = frozenset(
         "restarts",
     }
 )
+# Groups end, and are made anew: not while that is refused.
+_MADE_ANEW: Final = frozenset({"configure_again", "reload_without"})
 _RETURNS: Final = frozenset({"dies", "dies_in_write", "leaves", "other_type", "restarts"})
 # Before its messages have come for a while, nothing is known of a group but what the graph shows.
 _AT_FIRST: Final = frozenset(
@@ -84,6 +86,8 @@ _AT_FIRST: Final = frozenset(
 )
 # Their ends are like their begins: the driver ends, and returns at once.
 _RETURN_TWICE: Final = frozenset({"best_effort", "other_type"})
+# So long the relay remembers the paces of an input.
+_PACES_S: Final = 120.0
 # Moments are multiples of periods, which are whole nanoseconds.
 _ROUNDED: Final = 1_000_000
 # Ticks come late, or all at once.
@@ -414,7 +418,8 @@ class Promises:
         for step in spoiling:
             # What waits for the next message waits for a second at most.
             kind, end = KINDS[step.kind], step.at + step.seconds + plan.prompt
-            times.append(((end if kind.at_end else step.at) - _BEFORE_S, end + max(at_least, kind.again_s)))
+            at_end = kind.at_end and not self._happened(_MADE_ANEW, step.at, end)
+            times.append(((end if at_end else step.at) - _BEFORE_S, end + max(at_least, kind.again_s)))
         return [(0.0, SETTLED_S), *times]
 
     def _is_calm(self, group: Group, at: float) -> bool:
@@ -512,8 +517,9 @@ class Promises:
             if seen.at > plan.length:
                 return
             if seen.at < SETTLED_S:
-                # Who sends transforms may be found later than the sensors, and sets do not wait for that.
-                late = {"no_transform"} if plan.transforms and plan.missed else set[str]()
+                # Who sends transforms may be found later than the sensors, and sets do not wait for that; nor, once
+                # there is a simulated clock, any longer if they were matched before.
+                late = {"no_transform"} if plan.transforms and (plan.missed or plan.by_sim_time) else set[str]()
                 if seen.code not in _QUIET | _AT_FIRST | late:
                     yield f"{seen.at:.2f} s: {group.name}: {seen.code}: {seen.text}\n    is said at once"
                     return
@@ -528,6 +534,7 @@ class Promises:
             for step in near:
                 if (
                     is_felt(step.kind, step.target, group, plan)
+                    and not (step.kind == "halves" and self._had_two_paces(step))
                     and step.at + NAMED_S <= seen.at <= step.at + step.seconds
                     and seen.code not in KINDS[step.kind].names
                 ):
@@ -541,6 +548,14 @@ class Promises:
                 ):
                     yield f"{what}\n    is about {sorted(seen.about)} and not {step.target}"
                     return
+
+    def _had_two_paces(self, step: Step) -> bool:
+        """Whether a sensor has had another pace than its own lately, and so no steady one that it could fall below."""
+        return any(
+            each.kind == "doubles" and each.target == step.target and step.at - each.at - each.seconds < _PACES_S
+            for each in self.world.plan.steps
+            if each.at < step.at
+        )
 
     def _of_another_time(self, group: Group, seen: Seen) -> Iterator[str]:
         """Yield what blames somebody who has just come, or who was away and has come back."""
