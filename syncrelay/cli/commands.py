@@ -14,7 +14,7 @@ from syncrelay.cli.parser import Parser
 from syncrelay.errors import UnavailableError
 
 EXTRAS: Final[Mapping[str, tuple[str, ...]]] = {
-    "recordings": ("jinja2", "lz4", "mcap", "rich", "rosbags", "ruamel.yaml", "small_mcap", "zstandard"),
+    "recordings": ("jinja2", "lz4", "mcap", "rich", "rosbags", "ruamel.yaml", "small_mcap", "xxhash", "zstandard"),
     "datasets": ("PIL", "av", "isal", "pyarrow"),
     "fleet": ("ray",),
     "top": ("rich", "textual"),

@@ -4,19 +4,18 @@ import os
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from hashlib import blake2b, file_digest
+from hashlib import file_digest
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 from pydantic import Field
+from xxhash import xxh128
 
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag.listing import local_files
 from syncrelay.recordings.bag.remote_file import RemoteFile
 from syncrelay.recordings.bag.storage import files_of, is_url
 from syncrelay.urls import redacted
-
-_DIGEST_BYTES: Final = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +35,7 @@ class ResultFile:
     """A file of a result: its size in bytes, and the hash of its content."""
 
     size: Annotated[int, Field(alias="bytes")]
-    hash: Annotated[str, Field(alias="blake2b")]
+    hash: Annotated[str, Field(alias="xxh128")]
 
 
 def content_of(place: str) -> Content:
@@ -70,7 +69,7 @@ def results_in(folder: Path) -> dict[str, ResultFile]:
     for path in sorted(folder.rglob("*")):
         if not path.is_dir():
             with path.open("rb") as file:
-                digest = file_digest(file, _blake).hexdigest()
+                digest = file_digest(file, xxh128).hexdigest()
             found[path.relative_to(folder).as_posix()] = ResultFile(path.stat().st_size, digest)
     return found
 
@@ -108,7 +107,7 @@ def _of_url(word: str) -> Content:
 
 
 def _of_several(lines: Sequence[str]) -> str:
-    return f"blake2b:{_blake(os.fsencode(chr(10).join(lines))).hexdigest()}"
+    return f"xxh128:{xxh128(os.fsencode(chr(10).join(lines))).hexdigest()}"
 
 
 def _hash(path: Path) -> str:
@@ -116,7 +115,7 @@ def _hash(path: Path) -> str:
         if not path.is_file():
             raise BagError(f"{path}: is not a regular file, as a recording has to be")
         with path.open("rb") as file:
-            return f"blake2b:{file_digest(file, _blake).hexdigest()}"
+            return f"xxh128:{file_digest(file, xxh128).hexdigest()}"
     except OSError as error:
         raise BagError(f"{path}: cannot be read: {error.strerror}") from error
 
@@ -127,7 +126,3 @@ def _marks(files: Sequence[Path]) -> tuple[tuple[int, ...], ...]:
     except OSError as error:
         raise BagError(f"{error.filename}: cannot be read: {error.strerror}") from error
     return tuple((each.st_size, each.st_mtime_ns, each.st_ino) for each in found)
-
-
-def _blake(content: bytes = b"") -> blake2b:
-    return blake2b(content, digest_size=_DIGEST_BYTES)
