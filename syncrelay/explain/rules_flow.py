@@ -86,8 +86,14 @@ def messages_lost(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found
 def _why_lost(graph: InputGraph, losing: Sequence[Sender]) -> tuple[str, str]:
     """Say why messages did not arrive, as far as it is known, and what to do."""
     names, profile = " and ".join(each.node for each in losing), graph.profile
-    # DDS reports what it lost on the way, and not what a full history gave up for newer messages.
-    if profile is not None and profile.history == "keep_last" and 2 * graph.lost < graph.undelivered:
+    # DDS reports what it lost on the way, and not what a full history gave up for newer messages: those came.
+    came = sum(each.delivered for each in graph.senders)
+    if (
+        profile is not None
+        and profile.history == "keep_last"
+        and 2 * graph.lost < graph.undelivered
+        and came >= profile.depth
+    ):
         depth = min(_MOST_KEPT, profile.depth + sum(each.longest_gap for each in losing))
         return (
             f"newer ones replaced them in the relay's subscription, whose `depth` of {profile.depth} was too small",

@@ -58,8 +58,7 @@ _BACK: Final = 0.3
 _DEEPER: Final = 0.8
 # As long as another, and what is no more than a few: the index of an input.
 _AS_LONG: Final = frozenset({"missing", "sets_since_without", "spans", "latencies"})
-_AS_IN_CASES: Final = frozenset({"trigger", "pacemaker", "unsteady", "every", "name", "required"})
-_NOT_TURNED: Final = _AS_IN_CASES | {"input"}
+_AS_IN_CASES: Final = frozenset({"trigger", "pacemaker", "unsteady", "every", "name", "required", "input"})
 # What files may ask for, and no case has.
 _MORE: Final[Pool] = {
     (GroupFacts, "every"): [2, 5],
@@ -155,7 +154,7 @@ def _dial(value: Any, chance: random.Random) -> Dial | None:
 
     Of many, some or all are moved together.
     """
-    parts = [(name, part) for name, part in _parts(value) if name not in _NOT_TURNED and _has_numbers(part)]
+    parts = [(name, part) for name, part in _parts(value) if name not in _AS_IN_CASES and _has_numbers(part)]
     records = [each for each in parts if not isinstance(each[1], int | float | Distribution)]
     if not parts:
         return None

@@ -65,6 +65,9 @@ FOUND = {
         undelivered(12, 4, others=[Sender("/other", 90, 85, longest_gap=2), Sender("/third", 90, 90)]), LIDAR
     ),
     "messages of best effort that were lost": a_group(undelivered(12, 1, lost=12, reliability="best_effort"), LIDAR),
+    "fewer messages of best effort than a history holds": a_group(
+        undelivered(194, 60, reliability="best_effort"), LIDAR
+    ),
     "messages that were lost though they are reliable": a_group(undelivered(12, 9, lost=7), LIDAR),
     "an input that came slowly because messages were lost": a_group(
         undelivered(100, 4, depth=1, figures={"pace_hz": 2.0, "slowed_from_hz": 10.0}), LIDAR
