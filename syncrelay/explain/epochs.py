@@ -5,9 +5,9 @@ change; a wrong one leaves a saw-tooth or a slope that no clock has.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from operator import sub
-from statistics import median
+from statistics import median, median_high, median_low
 from typing import Final, NamedTuple
 
 from syncrelay.clock import MOST_RATE
@@ -55,9 +55,10 @@ OTHER_RATE: Final = 1.5 * MOST_RATE
 
 
 class Reading(NamedTuple):
-    """How stamps have to be read: what they do, in words, and how many times as fast as this machine's time they run.
+    """How stamps have to be read: what they do, in words, and how many times as fast as the times of receipt they run.
 
-    `is_unit` says that the unit is wrong, and not the clock, and `strayed` by how much their delays changed.
+    `is_unit` says that the unit is wrong, and not the clock: else the words end before the name of the clock that they
+    run against. `strayed` is by how much their delays changed.
     """
 
     what: str
@@ -112,6 +113,16 @@ def time_scale(newest: int, behind: int) -> TimeScale | None:
     if 0 < zones <= _MOST_ZONES and abs(rest - _ZONE // 2) < _SECOND:
         return TimeScale("look like local time, not UTC", round(behind / _ZONE) * _ZONE)
     return None
+
+
+def usual_delay(delays: Collection[int]) -> int:
+    """Return the delay of an input whose stamps are of the usual time: that of most clocks, ours among them.
+
+    Ours says 0: of as many that agree with it as do not, it decides.
+    """
+    clocks = [*delays, 0]
+    usual = min(median_low(clocks), median_high(clocks), key=abs)
+    return min(delays, key=lambda each: abs(each - usual))
 
 
 def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
@@ -203,7 +214,7 @@ def _of_rate(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:
             return Reading(unit.what, unit.rate, is_unit=True, strayed=scatter)
     if len(last) < _FEWEST:
         return None
-    runs = f"run at {rate:.4g} times the speed of this machine's time"
+    runs = f"run at {rate:.4g} times the speed of"
     return Reading(f"{_FROM_BOOT}, and {runs}" if 0 <= last[-1][0] < BOOT_NS else runs, rate, strayed=scatter)
 
 

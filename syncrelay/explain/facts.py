@@ -214,6 +214,13 @@ class GroupFacts:
     """How many of the possible sets leave."""
 
     @property
+    def clock_name(self) -> str:
+        """The clock by which the times of receipt are."""
+        if self.is_recorded:
+            return "the recorder's clock"
+        return "this machine's clock" if self.clock is None else "/clock"
+
+    @property
     def required_first(self) -> Sequence[int]:
         """The indices of the inputs, those of the required ones first."""
         indices = range(len(self.inputs))

@@ -37,30 +37,29 @@ def off_the_clock(facts: GroupFacts) -> Found:
     by = off[index]
     are_all = len(off) == len(required) > 1 and max(off.values()) - min(off.values()) < _OFF
     whose = "all inputs" if are_all else facts.inputs[index].name
-    clock, to_one_clock = _clock(facts)
     others = [each for each in off if each != index]
     mapped = offered_stamps(facts, Code.OTHER_CLOCK, index, *others)
     yield Fault(
-        f"stamps of {whose} are {words.span_of_time(abs(by))} {'behind' if by > 0 else 'ahead of'} {clock},"
-        " which triggers the sets",
-        to_one_clock + mapped,
+        f"stamps of {whose} are {words.span_of_time(abs(by))} {'behind' if by > 0 else 'ahead of'}"
+        f" {facts.clock_name}, which triggers the sets",
+        _to_one_clock(facts) + mapped,
         Severity.ERROR,
         input=None if are_all else index,
     )
 
 
-def _clock(facts: GroupFacts) -> tuple[str, str]:
-    """Return the clock that triggers, and what to do where stamps are off it."""
+def _to_one_clock(facts: GroupFacts) -> str:
+    """Say what to do where stamps are off the clock that triggers."""
     if facts.is_recorded:
-        return "the recorder's clock", (
+        return (
             "record what a simulation publishes with `ros2 bag record --use-sim-time`, or let an input be the `trigger`"
         )
     if facts.clock is None:
-        return "this machine's clock", (
+        return (
             "with a simulation or a recording, write `node: {use_sim_time: true}` and play it with --clock; else"
             " synchronize the clocks of the machines"
         )
-    return "/clock", "check whether what publishes these topics uses simulated time as well"
+    return "check whether what publishes these topics uses simulated time as well"
 
 
 def too_old(facts: GroupFacts) -> Found:

@@ -1,16 +1,16 @@
 """Findings about stamps: unset, of another clock, falling, drifting."""
 
 from collections.abc import Iterable
-from statistics import median_low
 from typing import Final
 
 from syncrelay.clock import Step
 from syncrelay.config.units import parse_duration
+from syncrelay.config.wording import all_of
 from syncrelay.explain import words
 from syncrelay.explain.changes import offset_change
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import Distribution
-from syncrelay.explain.epochs import time_scale
+from syncrelay.explain.epochs import TimeScale, time_scale, usual_delay
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.figures import InputFigures
 from syncrelay.explain.findings import SECOND, Fault, Found, blocks, counted, nodes, written
@@ -109,31 +109,39 @@ def other_clock(facts: GroupFacts) -> Found:
     known = {index: delay - facts.inputs[index].offset for index, delay in delays.items()}
     if len(known) < 2:  # noqa: PLR2004  one alone has no other clock
         return
-    # Of two, the one that is farther from this machine's time is odd.
-    usual = median_low(known.values()) if len(known) > 2 else min(known.values(), key=abs)  # noqa: PLR2004
-    odd = max(known, key=lambda index: abs(known[index] - usual))
-    behind = known[odd] - usual
+    usual = usual_delay(known.values())
     # What waited for the relay seems as late as that.
-    waited = 2 * max(waited_for_relay(facts))
-    if abs(behind) <= max(_OTHER_CLOCK, facts.tolerance.ns if facts.tolerance else 0, waited):
-        return
-    an_input, offset = facts.inputs[odd], facts.inputs[odd].offset
-    others = [facts.inputs[index].name for index in known if index != odd]
-    whose = others[0] if len(others) == 1 else "the other inputs"
-    apart_by = f"are {words.span_of_time(abs(behind))} {'behind' if behind > 0 else 'ahead of'} those of {whose}"
-    shifted = f", with its offset of {words.exactly(offset)}," if offset else ""
-    newest = an_input.figures.stamps[-1] if an_input.figures.stamps else 0
-    if scale := time_scale(newest, behind):
-        text = f"stamps of {an_input.name}{shifted} {apart_by}: they {scale.what}"
-        exact = None if scale.behind is None else scale.behind + offset
-        suggestion = f"have {nodes(an_input)} stamp with the host's time{_or_mapped(facts, odd, exact)}"
-    else:
-        text = f"stamps of {an_input.name}{shifted} {apart_by}"
-        suggestion = (
-            f"synchronize the clocks of their machines{_or_mapped(facts, odd, behind + offset)}"
-            f"{_wait_for_it(facts, odd, behind)}"
+    limit = max(_OTHER_CLOCK, facts.tolerance.ns if facts.tolerance else 0, 2 * max(waited_for_relay(facts)))
+    off = {index: behind for index, delay in known.items() if abs(behind := delay - usual) > limit}
+    usually = [facts.inputs[index].name for index in known if index not in off]
+    whose = "the other inputs" if len(off) == 1 < len(usually) else all_of(usually)
+    for index, behind in sorted(off.items(), key=lambda each: -abs(each[1])):
+        an_input, offset = facts.inputs[index], facts.inputs[index].offset
+        shifted = f", with its offset of {words.exactly(offset)}," if offset else ""
+        newest = an_input.figures.stamps[-1] if an_input.figures.stamps else 0
+        scale = time_scale(newest, behind)
+        text = (
+            f"stamps of {an_input.name}{shifted} are {words.span_of_time(abs(behind))}"
+            f" {'behind' if behind > 0 else 'ahead of'} those of {whose}{f': they {scale.what}' if scale else ''}"
         )
-    yield Fault(text, suggestion, blocks(facts, an_input), input=odd)
+        by = behind if scale is None else scale.behind
+        mapped = _or_mapped(facts, index, None if by is None else by + offset)
+        right = _to_the_usual_time(facts, an_input, scale)
+        otherwise = (
+            "" if scale is not None else _wait_for_it(facts, index, behind) or _if_recorded(facts, index, behind)
+        )
+        yield Fault(text, f"{right}{mapped}{otherwise}", blocks(facts, an_input), input=index)
+
+
+def _to_the_usual_time(facts: GroupFacts, an_input: InputFacts, scale: TimeScale | None) -> str:
+    if facts.clock is not None:
+        return f"have {nodes(an_input)} use simulated time as well"
+    return f"have {nodes(an_input)} stamp with the host's time" if scale else "synchronize the clocks of their machines"
+
+
+def _if_recorded(facts: GroupFacts, index: int, behind: int) -> str:
+    is_old = behind > _LATENCY and facts.clock is None and not facts.is_recorded
+    return f"; if {nodes(facts.inputs[index])} plays a recording, take all inputs from it" if is_old else ""
 
 
 def _least_delay(figures: InputFigures) -> int:
@@ -156,14 +164,16 @@ def _misread(facts: GroupFacts) -> Found:
         is_sure = reading.is_unit or reading.strayed > _OTHER_CLOCK
         if not (is_sure or facts.has_stopped or facts.standing is not Standing.ENOUGH):
             continue
-        check = (
-            "writes whole seconds into sec and the rest, in nanoseconds, into nanosec"
-            if reading.is_unit
-            else "stamps with the host's time, not with simulated time or a counter of its own"
-        )
+        what = reading.what if reading.is_unit else f"{reading.what} {facts.clock_name}"
+        if reading.is_unit:
+            right = "writes whole seconds into sec and the rest, in nanoseconds, into nanosec"
+        elif facts.clock is not None:
+            right = "uses simulated time as well"
+        else:
+            right = "stamps with the host's time, not with that of a simulation or a recording, or a counter of its own"
         yield Fault(
-            f"stamps of {an_input.name} {reading.what}",
-            f"check that {nodes(an_input)} {check}{_or_mapped(facts, index)}",
+            f"stamps of {an_input.name} {what}",
+            f"check that {nodes(an_input)} {right}{_or_mapped(facts, index)}",
             blocks(facts, an_input),
             input=index,
         )

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, combinations
 from math import ceil
-from statistics import median_low
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from syncrelay.config import Distance, GroupConfig
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
 from syncrelay.explain.changes import Change, Changes, changed, offset_change
-from syncrelay.explain.epochs import time_scale
+from syncrelay.explain.epochs import time_scale, usual_delay
 from syncrelay.explain.nearest import (
     LONGEST,
     InOrder,
@@ -422,9 +421,7 @@ class Trials:
         delays = {at: delay for at, delay in usually.items() if delay is not None}
         if index not in delays or len(delays) < 2:  # noqa: PLR2004  one alone has no other clock
             return 0
-        # Of two, the one that is farther from this machine's time is odd.
-        usual = median_low(delays.values()) if len(delays) > 2 else min(delays.values(), key=abs)  # noqa: PLR2004
-        return delays[index] - usual
+        return delays[index] - usual_delay(delays.values())
 
 
 def _waits(*each: int) -> Iterator[Changes]:

@@ -168,6 +168,19 @@ def far_off(rig: Rig) -> Truth | None:
     return _truth("other_clock", flow, rig.seen(), (abs(by) * S,), moments="slop" in rig.options)
 
 
+@_kind()
+def two_of_a_host(rig: Rig) -> Truth | None:
+    """Two inputs are of the clock of another host, which is off by seconds to hours."""
+    by = _sign(rig) * _log(rig, 1.3, 7000)
+    if len(rig.flows) < 3 or any(abs(by - known) < 2 for known in (18, 37, -18, -37)):
+        return None
+    two = rig.chance.sample(rig.flows, 2)
+    for flow in two:
+        flow.stamps = flow.stamps + round(by * S)
+    topics = frozenset(each.topic for each in two)
+    return Truth(frozenset({"other_clock"}), topics, rig.seen(), (abs(by) * S,)) if _lost(rig) >= 0.95 else None
+
+
 def _is_trigger_at_once(rig: Rig, flow: Flow) -> bool:
     """Whether another clock shows otherwise: what is held serves any trigger that is not older."""
     return rig.options["policy"] == "latest_time" and flow.topic != rig.options["trigger"]

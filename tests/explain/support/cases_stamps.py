@@ -3,6 +3,7 @@
 from syncrelay.config import Distance
 from syncrelay.explain import ClockState, Code, Distribution, Endpoint, Step, Tolerance
 from syncrelay.explain.clocks import Drift
+from syncrelay.explain.epochs import Reading
 from syncrelay.sync.messages import DropReason
 from tests.explain.support.cases import (
     AGES,
@@ -30,6 +31,8 @@ TWO = Endpoint("/a", IMAGE), Endpoint("/b", IMAGE)
 
 SWINGING = {"swings": 2, "swung_by": 3 * S}
 
+HOUR = 3600 * S
+
 STEPPED = {"stepped": Step(NOW - 12 * S, -2 * S)}
 
 # What is said of each stands in tests/explain/findings.txt.
@@ -41,6 +44,22 @@ FOUND = {
     ),
     "stamps of 0": a_silent_group(dropped(DropReason.UNSTAMPED, 100, delay=None), LIDAR),
     "stamps of another clock": a_silent_group(camera(figures={"delay": 37_205 * MS}), LIDAR),
+    "stamps of two hosts of four inputs": a_silent_group(
+        *(an_input(f"/{name}", figures={"delay": -2 * HOUR}) for name in ("camera", "imu")), LIDAR, an_input("/gps")
+    ),
+    "stamps of another clock than the simulated one": a_silent_group(
+        camera(figures={"delay": -2 * HOUR}), LIDAR, clock=ClockState(received=True)
+    ),
+    "stamps that run faster than simulated time": a_silent_group(
+        camera(figures={"stamps": (1, 2), "reading": Reading("run at 2 times the speed of", 2.0)}),
+        LIDAR,
+        clock=ClockState(received=True),
+    ),
+    "stamps that are recorded to run slower": a_silent_group(
+        camera(figures={"stamps": (1, 2), "reading": Reading("run at 0.5 times the speed of", 0.5)}),
+        LIDAR,
+        is_recorded=True,
+    ),
     "stamps that count from boot": a_silent_group(
         camera(figures={"delay": NOW - 5000 * S, "stamps": (5000 * S,)}), LIDAR
     ),
