@@ -98,7 +98,7 @@ def other_clock(facts: GroupFacts) -> Found:
         return
     misread = list(_misread(facts))
     yield from misread
-    if misread or facts.ticks_hz is not None or not facts.has_stopped:
+    if misread or facts.ticks_hz is not None or not (facts.has_stopped or any(map(_is_ahead, facts.inputs))):
         return
     # Two messages show whether their stamps run as time does.
     delays = {
@@ -113,9 +113,12 @@ def other_clock(facts: GroupFacts) -> Found:
     # What waited for the relay seems as late as that.
     limit = max(_OTHER_CLOCK, facts.tolerance.ns if facts.tolerance else 0, 2 * max(waited_for_relay(facts)))
     off = {index: behind for index, delay in known.items() if abs(behind := delay - usual) > limit}
+    if not facts.has_stopped:
+        # What is behind may be a result that takes so long. Simulated time is told late itself.
+        off = {index: by for index, by in off.items() if 2 * known[index] < by < 0 and facts.clock is None}
     usually = [facts.inputs[index].name for index in known if index not in off]
     whose = "the other inputs" if len(off) == 1 < len(usually) else all_of(usually)
-    for index, behind in sorted(off.items(), key=lambda each: -abs(each[1])):
+    for index, behind in sorted(off.items(), key=lambda each: -abs(each[1]) // SECOND):
         an_input, offset = facts.inputs[index], facts.inputs[index].offset
         shifted = f", with its offset of {words.exactly(offset)}," if offset else ""
         newest = an_input.figures.stamps[-1] if an_input.figures.stamps else 0
@@ -124,18 +127,23 @@ def other_clock(facts: GroupFacts) -> Found:
             f"stamps of {an_input.name}{shifted} are {words.span_of_time(abs(behind))}"
             f" {'behind' if behind > 0 else 'ahead of'} those of {whose}{f': they {scale.what}' if scale else ''}"
         )
+        text += "" if facts.has_stopped else ": sets hold messages of different moments"
         by = behind if scale is None else scale.behind
         mapped = _or_mapped(facts, index, None if by is None else by + offset)
         right = _to_the_usual_time(facts, an_input, scale)
-        otherwise = (
-            "" if scale is not None else _wait_for_it(facts, index, behind) or _if_recorded(facts, index, behind)
-        )
+        otherwise = "" if scale else _wait_for_it(facts, index, behind) or _if_recorded(facts, index, behind)
         yield Fault(text, f"{right}{mapped}{otherwise}", blocks(facts, an_input), input=index)
+
+
+def _is_ahead(an_input: InputFacts) -> bool:
+    """Whether its last message is stamped for a time that had not come when it was received."""
+    delays = an_input.figures.delays
+    return bool(delays) and delays[-1] - an_input.offset < -_OTHER_CLOCK // 2
 
 
 def _to_the_usual_time(facts: GroupFacts, an_input: InputFacts, scale: TimeScale | None) -> str:
     if facts.clock is not None:
-        return f"have {nodes(an_input)} use simulated time as well"
+        return f"check that {nodes(an_input)} uses simulated time as well"
     return f"have {nodes(an_input)} stamp with the host's time" if scale else "synchronize the clocks of their machines"
 
 

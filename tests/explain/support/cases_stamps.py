@@ -44,6 +44,9 @@ FOUND = {
     ),
     "stamps of 0": a_silent_group(dropped(DropReason.UNSTAMPED, 100, delay=None), LIDAR),
     "stamps of another clock": a_silent_group(camera(figures={"delay": 37_205 * MS}), LIDAR),
+    "stamps ahead of their time while sets leave": a_group(
+        camera(figures={"delay": -997 * MS, "received": tuple(NOW - n * S for n in range(9, -1, -1))}), LIDAR
+    ),
     "stamps of two hosts of four inputs": a_silent_group(
         *(an_input(f"/{name}", figures={"delay": -2 * HOUR}) for name in ("camera", "imu")), LIDAR, an_input("/gps")
     ),
@@ -167,6 +170,9 @@ QUIETLY = {
     },
     Code.OTHER_CLOCK: {
         "another clock while sets leave": a_group(camera(figures={"delay": 37_205 * MS}), LIDAR),
+        "simulated time that is told late while sets leave": a_group(
+            camera(figures={"delay": -997 * MS}), LIDAR, clock=ClockState(received=True)
+        ),
         "another clock that its offset makes good": a_silent_group(
             camera(offset=37_200 * MS, figures={"delay": 37_205 * MS}), LIDAR
         ),
