@@ -168,6 +168,14 @@ def may_cost(cause: Cause, code: Code, facts: GroupFacts) -> bool:
     return not (cause.finding.code is Code.TOO_SLOW and code is Code.OVER_SLOP and rules_matching.none_is_near(facts))
 
 
+def outlasts(finding: Finding, cause: Cause, facts: GroupFacts) -> bool:
+    """Whether an input has been silent after a relay that stood still got again what it had missed."""
+    if finding.code is not Code.SILENT or cause.finding.code is not Code.TOO_SLOW:
+        return False
+    last = max(facts.inputs[index].figures.last_received or 0 for index in finding.about)
+    return facts.figures.now - last > max(rules_flow.waited_for_relay(facts)) + rules_flow.SENT_AGAIN
+
+
 def most_missed(finding: Finding, facts: GroupFacts) -> float:
     """Return how many sets a cause may have cost where it was short: twice those of its time and of a second."""
     lasted = max(rules_flow.waited_for_relay(facts)) / SECOND + 1

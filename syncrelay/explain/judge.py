@@ -42,6 +42,7 @@ from syncrelay.explain.causes import (
     is_aside,
     may_cost,
     most_missed,
+    outlasts,
     over_since,
     seen_since,
     set_at,
@@ -278,7 +279,7 @@ class Judge:
             # What the graph shows no more is not why no set leaves now.
             return False
         explained, about = EXPLAINS[cause.finding.code], cause.finding.input
-        if finding.code not in explained.in_group and finding.code not in explained.of_input:
+        if outlasts(finding, cause, facts) or finding.code not in explained.in_group | explained.of_input:
             return False
         is_narrow = finding.code not in explained.in_group or cause.is_aside or _is_of_own_stamps(finding, facts)
         if is_narrow and about is not None and about != finding.input:

@@ -114,10 +114,10 @@ def _why_lost(graph: InputGraph, losing: Sequence[Sender]) -> tuple[str, str]:
 def too_slow(facts: GroupFacts) -> Found:
     """Find that messages of the group waited for the relay, or were missed while it stood still."""
     waited, missed = waited_for_relay(facts)
-    if waited >= _TOO_SLOW:
-        text = f"messages waited up to {words.duration(waited)} for the relay"
-    elif missed >= _TOO_SLOW:
+    if missed >= _TOO_SLOW and missed > waited:
         text = f"the relay stood still for {words.duration(max(each.ns for each in facts.standstills))}"
+    elif waited >= _TOO_SLOW:
+        text = f"messages waited up to {words.duration(waited)} for the relay"
     else:
         return
     yield Fault(

@@ -6,8 +6,8 @@ from syncrelay.explain import ClockState, Code, Finding, Severity, explanation, 
 from syncrelay.explain.causes import EXPLAINS, explained_by
 from syncrelay.sync.messages import DropReason
 from tests.explain.support import cases_flow, cases_graph, cases_stamps, cases_transforms
-from tests.explain.support.cases import STRANGER, UNFIT, camera, fed, said_of_cases
-from tests.explain.support.groups import S, a_group, a_silent_group, an_input
+from tests.explain.support.cases import LIDAR, QUIET, STRANGER, UNFIT, camera, fed, said_of_cases, wide
+from tests.explain.support.groups import NOW, S, a_group, a_silent_group, an_input
 
 FOUND = cases_graph.FOUND | cases_stamps.FOUND | cases_flow.FOUND | cases_transforms.FOUND
 QUIETLY = [
@@ -101,3 +101,10 @@ def test_no_finding_explains_itself_by_way_of_others():
 
     for code in EXPLAINS:
         walk(code, [])
+
+
+def test_a_relay_that_waited_briefly_explains_no_long_silence():
+    quiet = camera(figures={**QUIET, "last_received": NOW - 6 * S})
+    found = judge(a_silent_group(quiet, LIDAR, figures=wide(*[30] * 9), waited=S))
+    assert {each.code for each in found} == {Code.TOO_SLOW, Code.SILENT}
+    assert explanation(found).code is Code.SILENT

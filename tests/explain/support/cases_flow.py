@@ -59,6 +59,12 @@ FOUND = {
         LIDAR,
         standstills=(Standstill(NOW - S, 3 * S),),
     ),
+    "a standstill after which only the last of the missed messages came": a_group(
+        camera(figures={"longest_pause": 3 * S, "last_received": NOW - S}),
+        LIDAR,
+        waited=900 * MS,
+        standstills=(Standstill(NOW - S, 3 * S),),
+    ),
     "a message that DDS lost": a_group(camera(lost=1), LIDAR),
     "messages that came too many at once": a_group(undelivered(12, 4, depth=1), LIDAR),
     "messages of two publishers that came too many at once": a_group(
