@@ -9,12 +9,12 @@ import yaml
 from rosbags.interfaces import Nodetype
 from rosbags.typesys.store import Typestore
 
-from syncrelay.cdr_walk import UnreadableFieldError
+from syncrelay.cdr_walk import UnreadableFieldError, walk_of
 from syncrelay.config import GroupConfig
 from syncrelay.config.interfaces import Interfaces
 from syncrelay.dataflow.bundle import Bundle, BundleError
 from syncrelay.errors import BagError
-from syncrelay.recordings.bag.definitions import fields_in, require_same, typestore
+from syncrelay.recordings.bag.definitions import fields_in, hash_of, require_same, typestore
 from syncrelay.recordings.bag.recording import Channel, Definition
 
 _ZEROS: Final[Mapping[str, Any]] = {"string": "", "wstring": "", "bool": False, "float32": 0.0, "float64": 0.0}
@@ -44,12 +44,15 @@ def recorded_bundle(group: GroupConfig, channels: Iterable[Channel]) -> Recorded
         return None
     for channel in channels:
         require_same(channel, store, of=name)
-    default = bytes(store.serialize_cdr(_default(store, interfaces, name), name))
+    fields_of = fields_in(store)
     try:
-        bundle = Bundle(group, fields_in(store), default)
+        # rosbags serializes nothing else.
+        walk_of(fields_of, name.replace("/msg/", "/"))
+        default = bytes(store.serialize_cdr(_default(store, interfaces, name), name))
+        bundle = Bundle(group, fields_of, default)
     except (BundleError, UnreadableFieldError) as error:
         raise BagError(f"{group.name}: {error}") from error
-    return RecordedBundle(bundle, Definition("ros2msg", text), store.hash_rihs01(name))
+    return RecordedBundle(bundle, Definition("ros2msg", text), hash_of(store, name))
 
 
 def _default(store: Typestore, interfaces: Interfaces, name: str) -> Any:

@@ -16,7 +16,7 @@ from rosbags.typesys.store import Typestore
 from syncrelay.cdr_walk import FieldsOf
 from syncrelay.config.interfaces import ROSIDL
 from syncrelay.errors import BagError
-from syncrelay.recordings.bag.plain_definitions import plain_idl, plain_msg
+from syncrelay.recordings.bag.plain_definitions import WIDE_STRING, plain_idl, plain_msg
 from syncrelay.recordings.bag.recording import Channel, Definition
 
 Convert: TypeAlias = Callable[[bytes], bytes | None]
@@ -63,11 +63,19 @@ def require_same(channel: Channel, store: Typestore, *, of: str) -> None:
     if recorded is None or channel.type not in store.fielddefs:
         raise BagError(f"{channel.topic}: the definition of {channel.type} is not known")
     if not is_same_wireformat(recorded, store, channel.type, channel.type):
-        hashes = [each.hash_rihs01(channel.type) for each in (recorded, store)]
+        hashes = [hash_of(each, channel.type) for each in (recorded, store)]
         raise BagError(
             f"{channel.topic} is recorded with another definition of {channel.type} than {of} has here:"
             f" {hashes[0]}, here {hashes[1]}"
         )
+
+
+def hash_of(store: Typestore, type_name: str) -> str:
+    """Return the RIHS01 hash of a type in a store; an empty text if it has wide strings, which rosbags cannot hash."""
+    try:
+        return store.hash_rihs01(type_name)
+    except KeyError:
+        return ""
 
 
 def begins_with_header(channel: Channel) -> bool | None:
@@ -106,14 +114,14 @@ def as_ros2(channel: Channel) -> tuple[Definition | None, str]:
     store = _store_of(channel.type, channel.definition)
     is_known = channel.type in store.fielddefs
     if channel.definition is not None and channel.definition.format != "ros1msg":
-        return channel.definition, channel.type_hash or (store.hash_rihs01(channel.type) if is_known else "")
+        return channel.definition, channel.type_hash or (hash_of(store, channel.type) if is_known else "")
     if not is_known:
         return None, channel.type_hash
     jazzy = _jazzy()
     if channel.type in jazzy.fielddefs and is_same_wireformat(store, jazzy, channel.type, channel.type):
         store = jazzy
     text, _ = store.generate_msgdef(channel.type, ros_version=2)
-    return Definition("ros2msg", text), channel.type_hash or store.hash_rihs01(channel.type)
+    return Definition("ros2msg", text), channel.type_hash or hash_of(store, channel.type)
 
 
 def jazzy_definition(type_name: str) -> tuple[Definition, str]:
@@ -165,7 +173,7 @@ def _require_bearable(types: Mapping[str, Any]) -> None:
         if kind == Nodetype.ARRAY and not 0 < count <= _LONGEST_ARRAY:
             raise ValueError(f"an array of {count} elements is not one that a message can have")
         # Numbers side by side are skipped at once; everything else is visited one by one.
-        is_plain = kind == Nodetype.SEQUENCE or (element[0] == Nodetype.BASE and element[1][0] != "string")
+        is_plain = kind == Nodetype.SEQUENCE or (element[0] == Nodetype.BASE and "string" not in element[1][0])
         return weight_of_field(element, depth) * (1 if is_plain else count)
 
     for name in types:
@@ -174,11 +182,25 @@ def _require_bearable(types: Mapping[str, Any]) -> None:
 
 def _parsed(type_name: str, definition: Definition) -> dict[str, Any]:
     if definition.format != "ros2idl":
-        return dict(get_types_from_msg(plain_msg(definition.text), type_name))
+        found = get_types_from_msg(plain_msg(definition.text), type_name)
+        return {
+            name: (constants, [(each, _widened(kind)) for each, kind in fields])
+            for name, (constants, fields) in found.items()
+        }
     types: dict[str, Any] = {}
     for text in plain_idl(definition.text):
         types |= get_types_from_idl(text)
     return types
+
+
+def _widened(description: Any) -> Any:
+    """Return the description of a field with wide strings in place of what stands for them."""
+    kind, what = description
+    if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        return kind, (_widened(what[0]), what[1])
+    if kind == Nodetype.NAME and what.startswith(WIDE_STRING):
+        return Nodetype.BASE, ("wstring", int(what.removeprefix(WIDE_STRING)))
+    return description
 
 
 @lru_cache(maxsize=1)

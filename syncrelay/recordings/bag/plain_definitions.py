@@ -11,7 +11,13 @@ _MOST_LINES: Final = 5_000
 _MOST_EXPRESSIONS: Final = 500
 
 _IDL_RULE: Final = "=" * 80 + "\n"
-_NO_LINE: Final = re.compile(r"^[ \t\r]*(?:#[^\n]*)?(?:\n|\Z)", re.MULTILINE)
+_NO_LINE: Final = re.compile(r"^[ \t]*(?:#[^\n]*)?(?:\n|\Z)", re.MULTILINE)
+# The parser knows no empty text and no wide string in .msg text. A wide text is as good as any where it is a constant;
+# elsewhere a message of a name that no package has stands for it.
+_TEXT_CONSTANT: Final = re.compile(r"^[ \t]*w?(string[ \t]+\w+[ \t]*=)([ \t]*$)?", re.MULTILINE)
+_WIDE_STRING: Final = re.compile(r"^[ \t]*wstring(?:<=(\d+))?(?=[ \t\[])", re.MULTILINE)
+WIDE_STRING: Final = "wide_strings/msg/W"
+"""What the name of a message begins with that stands for a wide string; its bound follows, 0 for none."""
 _STRING: Final = r'"(?:\\[\s\S]?|[^"\\])*(?:"|\Z)'
 # Of annotations only the value of an enumerator matters. A line with # is `#include`: all types follow in the text.
 _TOKEN: Final = re.compile(
@@ -29,11 +35,12 @@ _BOUND: Final = re.compile(r"(string\s*<[^<>]*>)(?=>)")
 
 
 def plain_msg(text: str) -> str:
-    """Return .msg text without comments and empty lines; raises ValueError if it is too large."""
+    """Return .msg text as rosbags can parse it, without comments and empty lines; raises ValueError if too large."""
     _require(len(text) <= _LONGEST_RECORDED)
-    plain = _NO_LINE.sub("", text)
+    plain = _NO_LINE.sub("", text.replace("\r\n", "\n"))
     _require(len(plain) <= _LONGEST and plain.count("\n") <= _MOST_LINES)
-    return plain
+    plain = _TEXT_CONSTANT.sub(lambda found: found[1] + ("" if found[2] is None else '""'), plain)
+    return _WIDE_STRING.sub(lambda found: f"{WIDE_STRING}{found[1] or 0}", plain)
 
 
 def plain_idl(text: str) -> Iterator[str]:
@@ -43,7 +50,7 @@ def plain_idl(text: str) -> Iterator[str]:
     """
     _require(len(text) <= _LONGEST_RECORDED)
     expressions = 0
-    for part in text.split(_IDL_RULE):
+    for part in text.replace("\r\n", "\n").split(_IDL_RULE):
         body = part.partition("\n")[2] if part.startswith(("IDL: ", "MSG: ")) else part
         plain = _TOKEN.sub(lambda token: token["kept"] or " ", body).strip()
         code = _TOKEN.sub(lambda token: token["kept"][0] if token["kept"] else " ", plain)

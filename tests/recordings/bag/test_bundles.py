@@ -158,6 +158,13 @@ def test_messages_of_another_definition_are_refused_with_both(tmp_path, monkeypa
     )
 
 
+def test_a_type_with_wide_strings_is_refused(tmp_path, monkeypatch):
+    wide = {**_DEFINITIONS, _SET: f"{_TEXT}wstring note\n"}
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(write_index(tmp_path / "wide", wide)))
+    with pytest.raises(BagError, match=r"^front: wstring has no plain layout$"):
+        write(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out.mcap", **_BUNDLE)
+
+
 def test_bundles_decide_what_a_replay_writes_and_not_which_sets_there_are():
     plain, beside, alone = (load_text(rig_file(**keys)).groups for keys in ({}, _BUNDLE, {**_BUNDLE, "outputs": False}))
     assert what_decides_sets(plain) == what_decides_sets(beside) == what_decides_sets(alone)
