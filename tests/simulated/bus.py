@@ -211,8 +211,10 @@ class Link:
         self.is_sending = True
         wants_past = "transient_local" == self.writer.profile.durability == self.reader.profile.durability
         if wants_past and self.writer.written > len(self.writer.history):
-            # Observed: what the history has dropped counts as one loss.
+            # Observed: what the history has dropped counts as one loss. Had the reader found the writer, it is one.
             self.reader.lost += 1
+            if self.is_receiving and self.writer.bus.lost is not None:
+                self.writer.bus.lost(self.reader)
         lifespan, now = self.writer.profile.lifespan, self.writer.participant.process.time_ns()
         for sample in list(self.writer.history) if wants_past else ():
             # Observed: what has outlived this in the writer's history is not sent; what a reader has by then stays.

@@ -455,6 +455,7 @@ def refuse_subscriptions(world: World, target: str, _: float) -> End:
 
     def relent() -> None:
         world.refused_everywhere = None
+        world.reload_again()
         end()
 
     return relent
@@ -497,6 +498,7 @@ def refuse_output(world: World, _: str, __: float) -> End:
 
     def relent() -> None:
         world.refused_output = None
+        world.reload_again()
 
     return relent
 

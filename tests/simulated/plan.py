@@ -234,7 +234,8 @@ def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
     )
     steps = tuple(sorted(_steps(chance, plan, kinds, first, chaotic=chaotic)))
     last = max((step.at + step.seconds for step in steps), default=SETTLED_S)
-    rest = chance.uniform(0, 20) if chaotic else HEALED_S + 15
+    # It may end amid all that, or when all of it is long over.
+    rest = chance.choice([chance.uniform(0, 20), HEALED_S + 15]) if chaotic else HEALED_S + 15
     return replace(plan, steps=steps, length=last + rest)
 
 

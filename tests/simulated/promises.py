@@ -4,13 +4,15 @@ import logging
 import re
 from bisect import bisect_left
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from syncrelay.explain import explanation
+from syncrelay.explain.codes import MATCHING, Code
+from syncrelay.explain.graph_facts import serving
 from syncrelay.status import Phase
 from tests.simulated.bus import Reader, Sample, Writer
 from tests.simulated.faults import KINDS, concerns, is_felt
@@ -49,6 +51,12 @@ _LOOKS_S: Final = 3.0
 _KEPT: Final = 100
 _SETS_ARE_MISSING: Final = frozenset({"few_sets", "over_slop", "unexplained"})
 _SILENT_FOR: Final = re.compile(r"(/\w+) has been silent for ([\d.]+) s|without (/\w+).*silent for ([\d.]+) s")
+# What findings about an input say of those who publish it.
+_IN_GRAPH: Final["Mapping[Code, Callable[[InputGraph], bool]]"] = {
+    Code.NO_PUBLISHER: lambda graph: not graph.publishers,
+    Code.OTHER_TYPE: lambda graph: any(each.type != TYPE for each in graph.publishers),
+    Code.INCOMPATIBLE_QOS: lambda graph: any(each.mismatch for each in graph.publishers),
+}
 _QUIET: Final = frozenset({"healthy", "starting", "nobody_listens"})
 # Messages are of no known moment, or cannot leave.
 _ODD: Final = frozenset({"doubles", "refuse_messages", "second_publisher", "stamps_early", "other_clock", "unstamped"})
@@ -233,6 +241,7 @@ class Promises:
             self.seen[name].append(Seen(self.world.now, first.code.value, about, first.text))
             told = [(each.code, each.about, each.text) for each in report.findings]
             self._look_for_punctual(name, [text for _, _, text in told])
+            self.broken += [f"{self.world.now:.2f} s: {name}: {what}" for what in _against_graph(report)]
             if len(set(told)) < len(told):
                 self.broken.append(f"{self.world.now:.2f} s: {name}: a finding is there twice: {told}")
 
@@ -474,20 +483,25 @@ class Promises:
         moments = [] if group.by_clock else list(self._moments(group))
         times = [each.came for each in moments]
         sent = [each.at for each in self.sets[group.name]]
+        hz = self.world.plan.hz
+        # The share of sets that left is of so long, or of 30 of them.
+        share_s = max(10.0, 30 / hz) + 2 * _LOOKS_S
         healthy_since = None
         for before, seen in pairwise(self.seen[group.name]):
             goes_on = seen.code == "healthy" and seen.at - before.at < _LOOKS_S
             healthy_since = (healthy_since or seen.at) if goes_on else None
-            begin, end = bisect_left(times, seen.at - _SHOWN_S), bisect_left(times, seen.at - _LATE_S)
+            end = bisect_left(times, seen.at - _LATE_S)
+            possible = end - bisect_left(times, seen.at - _SHOWN_S)
             is_well = healthy_since is not None and seen.at - healthy_since > _SHOWN_S
-            if is_well and bisect_left(sent, seen.at) - bisect_left(sent, seen.at - _SHOWN_S) < (end - begin) / 3 - 5:
+            if is_well and bisect_left(sent, seen.at) - bisect_left(sent, seen.at - _SHOWN_S) < possible / 3 - 5:
                 yield f"{seen.at:.2f} s: {group.name}: {seen.code}: {seen.text}\n    but few sets leave"
                 return
-            is_bad = seen.code in _SETS_ARE_MISSING and end - begin > (_SHOWN_S - _LATE_S) * self.world.plan.hz - 3
+            begin = bisect_left(times, seen.at - share_s)
+            is_bad = seen.code in _SETS_ARE_MISSING and end - begin > (share_s - _LATE_S) * hz - 3
             if not is_bad or not self._is_calm(group, seen.at) or self._happened(_BETWEEN, seen.at - HEALED_S, seen.at):
                 continue
             if all(each.left is not None and each.left < seen.at for each in moments[begin:end]):
-                what = f"{end - begin} of {end - begin} sets left in the last {_SHOWN_S:g} s"
+                what = f"{end - begin} of {end - begin} sets left in the last {share_s:g} s"
                 yield f"{seen.at:.2f} s: {group.name}: {seen.code}: {seen.text}\n    but {what}"
                 return
 
@@ -511,11 +525,13 @@ class Promises:
     def _false_findings(self, group: Group) -> Iterator[str]:
         plan = self.world.plan
         steps = [step for step in plan.steps if concerns(step.kind, step.target, group)]
-        if _overlap(steps):
-            return
+        # What befalls a group at once may be told as anything; once all is over and healed, it is well.
+        told_from = max(step.at + step.seconds + plan.prompt for step in steps) + HEALED_S if _overlap(steps) else 0.0
         for seen in self.seen[group.name]:
             if seen.at > plan.length:
                 return
+            if seen.at <= told_from:
+                continue
             if seen.at < SETTLED_S:
                 # Who sends transforms may be found later than the sensors, and sets do not wait for that; nor, once
                 # there is a simulated clock, any longer if they were matched before.
@@ -526,6 +542,8 @@ class Promises:
                 continue
             yield from self._of_another_time(group, seen)
             near = [step for step in steps if step.at - 1 <= seen.at <= step.at + step.seconds + HEALED_S]
+            # Who has sent twice as often for most of the time has slowed down since, for good.
+            near += [step for step in steps if told_from and step.kind == "doubles"]
             allowed = self._allowed(group, near, seen.at)
             what = f"{seen.at:.2f} s: {group.name}: {seen.code}: {seen.text}"
             if seen.code not in allowed:
@@ -590,6 +608,21 @@ class Promises:
             # What a publisher keeps comes all at once, and may have come before.
             allowed |= {"bursts", "duplicates", "out_of_order", "short_queue"}
         return allowed
+
+
+def _against_graph(report: "GroupReport") -> Iterator[str]:
+    """Yield what is said against what the graph shows at this look."""
+    inputs = report.facts.inputs
+    for each in report.findings:
+        for index in each.about if each.code in _IN_GRAPH and not each.is_over else ():
+            if not _IN_GRAPH[each.code](inputs[index].graph):
+                yield f"{each.code.value}: {each.text}\n    but the graph shows {inputs[index].graph.publishers}"
+    first = explanation(report.findings)
+    if first.code in MATCHING and not first.is_over:
+        for an_input in inputs:
+            if an_input.required and an_input.graph.publishers and not serving(an_input.graph, TYPE):
+                what = f"nothing of {an_input.name} can be received"
+                yield f"{first.code.value}: {first.text}\n    but {what}: {an_input.graph.publishers}"
 
 
 def _overlap(steps: Iterable[Step]) -> bool:

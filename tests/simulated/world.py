@@ -287,6 +287,8 @@ class World:
         self.refused_output: str | None = None
         """The one output on which it makes nothing."""
         self.refusals: dict[str, list[float]] = defaultdict(list)
+        self.reloads_again = False
+        """Whether the file was read while DDS made not all, and is to be read again once it does."""
         self.path = folder / "fusion.yaml"
         self.absent: set[str] = set()
         self.is_to_be_active = False
@@ -450,10 +452,16 @@ class World:
         """Have the relay read its file again, in one of the ways that there are."""
         if self.relay is None:
             return
+        self.reloads_again = any((self.refusal, self.refused_everywhere, self.refused_output))
         if self.random.random() < 0.5:
             self.relay.hang_up()
         else:
             self.ask("reload")
+
+    def reload_again(self) -> None:
+        """Have the file read again, as somebody does whose reload was refused, if one may have been."""
+        if self.reloads_again:
+            self.reload()
 
     def set_clock(self, by: int) -> None:
         """Set this machine's clock."""
