@@ -7,7 +7,7 @@ ROS ?= ros
 CONSTRAINTS ?= -c .ci/constraints.txt
 BIN := $(VENV)/bin
 # A change of these takes a new installation: the compiled path is built by it.
-BUILT_OF := pyproject.toml .ci/constraints.txt setup.py syncrelay/ros/compiled/path.pyx $(wildcard syncrelay/ros/compiled/*.pxi) docker/build_messages.py
+BUILT_OF := pyproject.toml .ci/constraints.txt setup.py $(wildcard syncrelay/*/compiled/*.p[xy][xi]) docker/build_messages.py
 # What the wheels of ROS lack of what the tests need.
 BUILD_TF2_MSGS = $(BIN)/python docker/build_messages.py docker/messages/tf2_msgs >/dev/null \
 	|| echo "tf2_msgs could not be built (it takes g++): tests with transforms are skipped" >&2
@@ -125,7 +125,7 @@ release: $(BIN)/python
 	DRY=$(DRY) .ci/release $(BIN)/python "$(VERSION)"
 
 clean:
-	rm -rf .venv* build dist *.egg-info syncrelay/ros/compiled/*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache docs/repository
+	rm -rf .venv* build dist *.egg-info syncrelay/*/compiled/*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache docs/repository
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "Python 3.11 or 3.12 is needed: apt-get install python3 python3-venv" >&2; exit 1; }

@@ -1,4 +1,4 @@
-"""What pyproject.toml cannot say: the compiled path is built where there are a C compiler and Python's headers."""
+"""What pyproject.toml cannot say: compiled code is built where there are a C compiler and Python's headers."""
 
 import hashlib
 import logging
@@ -8,9 +8,9 @@ from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 from setuptools.errors import BaseError, CCompilerError
 
-_SOURCE = Path("syncrelay/ros/compiled/path.pyx")
-_INCLUDED = sorted(_SOURCE.parent.glob("*.pxi"))
-_FINGERPRINT = hashlib.sha256(b"".join(each.read_bytes() for each in (_SOURCE, *_INCLUDED))).hexdigest()
+# As syncrelay.sync.compiled has them.
+_SOURCES = sorted(each for each in Path("syncrelay").glob("*/compiled/*.p*") if each.suffix in (".pxi", ".pyx"))
+_FINGERPRINT = hashlib.sha256(b"".join(each.read_bytes() for each in _SOURCES)).hexdigest()
 
 
 class _BuildWherePossible(build_ext):
@@ -21,7 +21,7 @@ class _BuildWherePossible(build_ext):
 
     def build_extension(self, ext: Extension) -> None:
         built = Path(self.get_ext_fullpath(ext.name))
-        in_clone = _SOURCE.with_name(built.name)
+        in_clone = Path(ext.sources[0]).with_name(built.name)
         # Every venv of this Python that is installed from the clone uses the one that is there.
         if in_clone.exists() and _FINGERPRINT.encode() in in_clone.read_bytes():
             if in_clone.absolute() != built.absolute():
@@ -34,7 +34,7 @@ class _BuildWherePossible(build_ext):
             super().build_extension(ext)
         except (BaseError, CCompilerError) as error:
             self.announce(
-                f"syncrelay is installed without its compiled path: each message costs more CPU ({error})",
+                f"syncrelay is installed without {ext.name}: each message costs more CPU ({error})",
                 logging.WARNING,
             )
 
@@ -42,13 +42,15 @@ class _BuildWherePossible(build_ext):
 setup(
     ext_modules=[
         Extension(
-            "syncrelay.ros.compiled.path",
-            [str(_SOURCE)],
-            depends=[str(each) for each in _INCLUDED],
+            ".".join(source.with_suffix("").parts),
+            [str(source)],
+            depends=[str(each) for each in _SOURCES if each.suffix == ".pxi"],
             define_macros=[("SYNCRELAY_SOURCE", f'"{_FINGERPRINT}"')],
             extra_compile_args=["-g0"],
             optional=True,
         )
+        for source in _SOURCES
+        if source.suffix == ".pyx"
     ],
     cmdclass={"build_ext": _BuildWherePossible},
 )

@@ -2,7 +2,6 @@
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
 from itertools import accumulate
 from operator import itemgetter
 from typing import Final, NamedTuple, TypeAlias
@@ -12,8 +11,8 @@ import numpy.typing as npt
 
 from syncrelay.clock import UNREADABLE
 from syncrelay.config import Distance
+from syncrelay.explain.received import InOrder, Received
 from syncrelay.explain.rows import Column, Rows, blocks, median, quantiles, steps
-from syncrelay.sync import Message
 
 Nanoseconds: TypeAlias = npt.NDArray[np.int64]
 
@@ -29,54 +28,12 @@ LONGEST: Final = _LATEST
 """No offset or wait longer than this, 146 years, is tried: as a duration of the file it might be out of range."""
 
 
-@dataclass(frozen=True, slots=True)
-class Received:
-    """One input's messages as they arrived: stamps, times of receipt, and their places among those of all inputs."""
-
-    stamps: Column
-    received: Column
-    places: Column
-    ordered: dict[int, "InOrder"] = field(default_factory=dict)
-    """What in_order gave, by the offset: all that compares inputs asks for it."""
-
-    @property
-    def are_stamped(self) -> npt.NDArray[np.bool_]:
-        """Which messages have a stamp."""
-        return _are_stamped(self.stamps[:])
-
-    def stamped(self) -> Iterator[tuple[Nanoseconds, Nanoseconds, Nanoseconds]]:
-        """Yield stamps, times of receipt and places of those that have a stamp, many at a time."""
-        for stamps, received, places in zip(*map(blocks, (self.stamps, self.received, self.places)), strict=True):
-            is_set = _are_stamped(stamps)
-            yield (stamps, received, places) if is_set.all() else (stamps[is_set], received[is_set], places[is_set])
-
-
-def _are_stamped(stamps: Nanoseconds) -> npt.NDArray[np.bool_]:
-    stamped: npt.NDArray[np.bool_] = (stamps != 0) & (stamps != UNREADABLE)
-    return stamped
-
-
-class InOrder(NamedTuple):
-    """An input's distinct stamps in order, offset added, the place of each message, and all places in order."""
-
-    stamps: Column
-    places: Column
-    arrivals: Column
-
-
 class Sides(NamedTuple):
     """For each stamp of one input: how far before and after it the nearest of another is, and the first not older."""
 
     before: Nanoseconds
     after: Nanoseconds
     at: Nanoseconds
-
-
-def as_arrays(messages: Sequence[Message], n_inputs: int) -> tuple[Received, ...]:
-    """Return messages, in the order of receipt and with the time of receipt as payload, as arrays for each input."""
-    columns = np.array([(each.stamp, each.payload, each.input) for each in messages], dtype=np.int64).reshape(-1, 3)
-    places = [np.nonzero(columns[:, 2] == index)[0] for index in range(n_inputs)]
-    return tuple(Received(columns[at, 0], columns[at, 1], at) for at in places)
 
 
 def in_order(messages: Received, offset: int) -> InOrder:

@@ -13,11 +13,11 @@ from syncrelay.explain.codes import Code
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.figures import InputFigures
 from syncrelay.explain.findings import written
-from syncrelay.explain.nearest import Nanoseconds, Received, period_of, quantile, shifted, sides
+from syncrelay.explain.nearest import Nanoseconds, period_of, quantile, shifted, sides
 from syncrelay.explain.pairing import is_certain
+from syncrelay.explain.received import Received
 from syncrelay.explain.trials import REQUIRED, UNTRIED, Trials, Tried, Verdict
 from syncrelay.explain.widths import with_headroom
-from syncrelay.sync import Message
 
 # A clock that is set more often, beside a few times at first, is no clock that can be mapped: it has another rate.
 _FEW_STEPS: Final = 2
@@ -244,16 +244,10 @@ def _with_stamps(trials: Trials, index: int, stamps: Nanoseconds, changes: Chang
     own = Received(stamps, trials.inputs[index].received, trials.inputs[index].places)
     inputs = [own if at == index else each for at, each in enumerate(trials.inputs)]
 
-    def messages() -> Iterator[Message]:
-        mapped = iter(stamps.tolist())
-        for each in trials.messages():
-            yield Message(index, next(mapped), each.payload, each.key) if each.input == index else each
-
     # As in a window: what the mapping costs until it has settled is not held against it.
     return replace(
         trials,
         config=changed(trials.config, changes),
-        messages=messages,
         inputs=inputs,
         is_window=True,
         sets=None,

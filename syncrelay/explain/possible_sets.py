@@ -12,9 +12,7 @@ import numpy.typing as npt
 from syncrelay.config import Distance, GroupConfig
 from syncrelay.explain.nearest import (
     FAR,
-    InOrder,
     Nanoseconds,
-    Received,
     Sides,
     in_order,
     period_of,
@@ -22,6 +20,7 @@ from syncrelay.explain.nearest import (
     sides,
     tightest_spans,
 )
+from syncrelay.explain.received import InOrder, Received
 from syncrelay.explain.rows import BLOCK, Column, Rows, blocks, extent, quantiles, steps
 from syncrelay.sync.latest_at_ticks import REST_NS
 from syncrelay.sync.ticks import Ticks

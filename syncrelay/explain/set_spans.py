@@ -1,8 +1,7 @@
 """Which of the sets that an engine gives are sets of one moment, as columns: many are looked at together."""
 
-from array import array
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -10,10 +9,11 @@ import numpy as np
 from syncrelay.clock import UNREADABLE
 from syncrelay.config import GroupConfig
 from syncrelay.explain.dry_run import EngineDriver
+from syncrelay.explain.feeding import Left, feed
 from syncrelay.explain.nearest import Nanoseconds, extents
 from syncrelay.explain.possible_sets import PossibleSets
-from syncrelay.explain.rows import BLOCK, Column, blocks, no_numbers
-from syncrelay.sync import Match, Message, Outcome
+from syncrelay.explain.received import Messages
+from syncrelay.explain.rows import Column, blocks, no_numbers
 
 
 class Run(NamedTuple):
@@ -26,23 +26,18 @@ class Run(NamedTuple):
 NOTHING: Final = Run(no_numbers(), no_numbers())
 
 
-def match(config: GroupConfig, messages: Iterable[Message], count: Callable[[Nanoseconds], None]) -> None:
+def match(config: GroupConfig, messages: Iterable[Messages], count: Callable[[Nanoseconds], None]) -> None:
     """Have an engine's sets counted, many at a time: the stamps, UNREADABLE where one is missing, and the tick."""
-    taken = array("q")
+    now, left = 0, Left(len(config.topics))
+    driver = EngineDriver(config, left.add)
 
     def give() -> None:
-        count(np.array(taken, dtype=np.int64).reshape(-1, len(config.topics) + 1))
-        del taken[:]
+        count(left.taken()[0][:, : len(config.topics) + 1])
 
-    def take(outcomes: Sequence[Outcome], _now: int) -> None:
-        for each in outcomes:
-            if isinstance(each, Match):
-                taken.extend([UNREADABLE if message is None else message.stamp for message in each.messages])
-                taken.append(UNREADABLE if each.tick is None else each.tick)
-        if len(taken) >= BLOCK:
-            give()
-
-    EngineDriver(config, take).run(messages)
+    for some in messages:
+        now = feed(driver, some, left)
+        give()
+    driver.finish(now)
     give()
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable, Sequence
 from typing import Final
 
 from syncrelay.config import GroupConfig
-from syncrelay.explain.nearest import as_arrays
+from syncrelay.explain.received import as_arrays
 from syncrelay.explain.trials import UNTRIED, Trials, Verdict
 from syncrelay.explain.try_budget import OutOfTimeError, TryBudget
 from syncrelay.sync import Message
@@ -110,7 +110,7 @@ class Suggester:
         longest = None if config.ticks is None else most * config.ticks.period_ns
         messages = _last(recent, pacemaker, longest)[-most:]
         inputs = as_arrays(messages, len(config.topics))
-        return Trials(config, lambda: self._budget.spent_on(messages), inputs, is_window=True)
+        return Trials(config, inputs, is_window=True, passed=self._budget.spent_on)
 
 
 def _last(

@@ -20,9 +20,7 @@ from syncrelay.explain.changes import Change, Changes, changed, offset_change
 from syncrelay.explain.epochs import time_scale, usual_delay
 from syncrelay.explain.nearest import (
     LONGEST,
-    InOrder,
     Nanoseconds,
-    Received,
     in_order,
     period_of,
     quantile,
@@ -30,10 +28,10 @@ from syncrelay.explain.nearest import (
     signed_distances,
 )
 from syncrelay.explain.possible_sets import PossibleSets, possible_sets
+from syncrelay.explain.received import InOrder, Messages, Received, stretches
 from syncrelay.explain.rows import Column, Rows, Stretches, extent, median, no_numbers, quantiles
 from syncrelay.explain.set_spans import NOTHING, Run, counted, match, of_one_moment
 from syncrelay.explain.widths import are_amid, tolerances, wander, with_headroom
-from syncrelay.sync import Message
 from syncrelay.sync.queues import LONGEST_QUEUE
 
 # Fewer possible sets are no evidence.
@@ -81,17 +79,18 @@ UNTRIED: Final = Verdict(())
 
 @dataclass(frozen=True)
 class Trials:
-    """Runs of a group's engine on messages, received at their payload's time; `inputs` holds the same as arrays.
+    """Runs of a group's engine on the messages of its inputs.
 
     A window is of a live group: it ends where the next messages are still to come.
     """
 
     config: GroupConfig
-    messages: Callable[[], Iterable[Message]]
     inputs: Sequence[Received]
     is_window: bool
     sets: Callable[[], Iterable[Nanoseconds]] | None = None
     """The sets that the group gives as it is, where they are known: a row a set, in which the stamps come first."""
+    passed: Callable[[Iterable[Messages]], Iterable[Messages]] = iter
+    """What passes the messages on to a run; it may end that by an exception."""
     kept: dict[Hashable, Any] = field(default_factory=dict)
     """What was found out of these messages, whatever the values of the file."""
     _targets: dict[int | None, PossibleSets | None] = field(default_factory=dict)
@@ -168,7 +167,7 @@ class Trials:
                 found[target].append(of_one_moment(each, config, sets))
 
         if changes or self.sets is None:
-            match(config, self.messages(), count)
+            match(config, self.passed(stretches(self.inputs)), count)
         else:
             for sets in self.sets():
                 count(sets)

@@ -3,14 +3,14 @@
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final
 
-from syncrelay.sync import Message
+from syncrelay.explain.received import Messages
 
 # A run costs 3 to 20 us a message, by what the engine has to do: a few runs for a group alone ...
 _MESSAGES: Final = 30_000
 # ... and for groups of one relay so much of the processor in a poll, after which no try begins, or goes on.
 _BEGINS_NS: Final = 40_000_000
 _ENDS_NS: Final = 80_000_000
-_ASKED_EVERY: Final = 50
+_ASKED_EVERY: Final = 250
 
 
 class TryBudget:
@@ -43,16 +43,18 @@ class TryBudget:
         """Whether no run may begin any more."""
         return self._left <= 0 or self._spent() >= _BEGINS_NS
 
-    def spent_on(self, messages: Iterable[Message]) -> Iterator[Message]:
+    def spent_on(self, messages: Iterable[Messages]) -> Iterator[Messages]:
         """Yield messages that a run takes. Raises OutOfTimeError where it takes too long.
 
         The first of a poll may take as long as it needs: on a slow machine none would end else.
         """
-        for number, each in enumerate(messages):
-            if self._has_finished and number % _ASKED_EVERY == 0 and self._spent() >= _ENDS_NS:
-                raise OutOfTimeError
-            self._left -= 1
-            yield each
+        for some in messages:
+            for begin in range(0, len(some.inputs), _ASKED_EVERY):
+                if self._has_finished and self._spent() >= _ENDS_NS:
+                    raise OutOfTimeError
+                part = some.part(begin, begin + _ASKED_EVERY)
+                self._left -= len(part.inputs)
+                yield part
         self._has_finished = True
 
     def _spent(self) -> int:

@@ -7,8 +7,8 @@ from typing import Any, Final, NamedTuple
 
 from syncrelay.dataflow.backend import BackendName, RclBackend, RclCallError
 from syncrelay.errors import RosUnavailableError, UsageError
-from syncrelay.ros.compiled import source_fingerprint
 from syncrelay.ros.rclpy_backend import RclpyBackend
+from syncrelay.sync.compiled import source_fingerprint
 
 VARIABLE: Final = "SYNCRELAY_RECEIVE"
 """The environment variable that names the backend, a BackendName."""

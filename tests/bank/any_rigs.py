@@ -14,7 +14,7 @@ from syncrelay.config import ConfigError, GroupConfig
 from syncrelay.explain import Finding, GroupFacts
 from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.input_observation import InputObservation
-from syncrelay.explain.nearest import as_arrays
+from syncrelay.explain.received import as_arrays
 from syncrelay.explain.trials import Trials
 from syncrelay.sync import Message
 from tests.bank.dials import Dial
@@ -279,4 +279,4 @@ def _whole(group: GroupConfig, sources: list[Source]) -> Trials:
         if stamp is not None
     ]
     messages.sort(key=lambda each: each.payload)
-    return Trials(group, lambda: messages, as_arrays(messages, len(sources)), is_window=False)
+    return Trials(group, as_arrays(messages, len(sources)), is_window=False)

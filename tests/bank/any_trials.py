@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from syncrelay.config import GroupConfig, load_text
-from syncrelay.explain.nearest import as_arrays
 from syncrelay.explain.other_stamps import by_other_stamps, wandering
+from syncrelay.explain.received import as_arrays
 from syncrelay.explain.trials import REQUIRED, Trials
 from syncrelay.sync import Message
 from tests.bank.dials import Dial
@@ -104,7 +104,7 @@ def dial_of_trials(chance: random.Random) -> Dial | None:
 def _answers(group: GroupConfig, came: list[Came], *, is_window: bool) -> Iterator[str]:
     messages = [Message(index, *each) for index, of_input in enumerate(came) for each in of_input]
     messages.sort(key=lambda each: each.payload)
-    trials = Trials(group, lambda: messages, as_arrays(messages, len(came)), is_window=is_window)
+    trials = Trials(group, as_arrays(messages, len(came)), is_window=is_window)
     yield str(trials.plan)
     for target in (REQUIRED, *trials.optional):
         yield str([trials.verdict(target, _KEYS), [trials.verdict(target, {key}) for key in _KEYS]])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from syncrelay.ros.compiled import source_fingerprint
+from syncrelay.sync.compiled import source_fingerprint
 from tests.container.docker import IMAGE, docker, run_docker
 
 pytestmark = pytest.mark.container

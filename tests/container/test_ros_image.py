@@ -2,7 +2,7 @@
 
 import pytest
 
-from syncrelay.ros.compiled import source_fingerprint
+from syncrelay.sync.compiled import source_fingerprint
 from tests.container.docker import HARDENED, ON_ROS, PROBED_EVERY_SECOND, docker
 from tests.container.stages import CONFIG, assert_relayed
 

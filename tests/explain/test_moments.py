@@ -15,8 +15,8 @@ import pytest
 from syncrelay.config import GroupConfig
 from syncrelay.explain.changes import Change, changed
 from syncrelay.explain.dry_run import EngineDriver
-from syncrelay.explain.nearest import as_arrays
 from syncrelay.explain.possible_sets import possible_sets
+from syncrelay.explain.received import as_arrays
 from syncrelay.explain.trials import REQUIRED, Trials
 from syncrelay.sync import DropReason, Match, Message, Outcome
 from tests.explain.scenario import BEGAN, MS, Source, group_of
@@ -40,7 +40,7 @@ class Moments:
 
     def trials(self) -> Trials:
         inputs = as_arrays(self.messages, len(self.stamps))
-        return Trials(self.config, lambda: self.messages, inputs, is_window=False)
+        return Trials(self.config, inputs, is_window=False)
 
 
 def drawn(

@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.config import Distance
-from syncrelay.explain.nearest import NearestSpans, Received, as_arrays, in_order, shifted, signed_distances
+from syncrelay.explain.nearest import NearestSpans, in_order, shifted, signed_distances
 from syncrelay.explain.possible_sets import possible_sets
+from syncrelay.explain.received import Received, as_arrays
 from syncrelay.explain.rows import BLOCK
 from syncrelay.sync import Message
 from tests.explain.scenario import BEGAN, MS, Source, group_of

@@ -8,8 +8,8 @@ import random
 
 import numpy as np
 
-from syncrelay.explain.nearest import as_arrays
 from syncrelay.explain.pairing import is_certain
+from syncrelay.explain.received import as_arrays
 from syncrelay.explain.trials import Trials
 from syncrelay.sync import Message
 from tests.explain.scenario import BEGAN, MS, Source, group_of
@@ -32,7 +32,7 @@ def a_rig(period_ms: float, other_ms: float, *, phase_ms: float, late_ms: float,
     ]
     messages.sort(key=lambda each: each.payload)
     config = group_of([Source("/camera", hz=1), Source("/lidar", hz=1)], {"slop": f"{slop_ms}ms"})
-    return Trials(config, lambda: messages, as_arrays(messages, 2), is_window=True)
+    return Trials(config, as_arrays(messages, 2), is_window=True)
 
 
 def farthest_ms(rig: Trials, late_ms: float) -> float:
@@ -65,5 +65,5 @@ def test_nothing_is_certain_of_an_optional_input_without_a_message():
     messages = [Message(index, BEGAN + at, BEGAN + at) for at in range(0, 10**10, 10**8) for index in (0, 1)]
     optional = Source("/imu", hz=1, required=False)
     config = group_of([Source("/a", hz=10), Source("/b", hz=10), optional], {"slop": "10ms", "max_wait": "1s"})
-    rig = Trials(config, lambda: messages, as_arrays(messages, 3), is_window=True)
+    rig = Trials(config, as_arrays(messages, 3), is_window=True)
     assert not is_certain(rig, 2)

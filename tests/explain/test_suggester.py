@@ -3,14 +3,15 @@
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from syncrelay.explain import UNREADABLE, Code, Finding, FindingLog, Severity
 from syncrelay.explain.changes import Change
-from syncrelay.explain.nearest import as_arrays
 from syncrelay.explain.other_stamps import by_other_stamps
+from syncrelay.explain.received import Messages, as_arrays
 from syncrelay.explain.suggester import Suggester
 from syncrelay.explain.trials import REQUIRED, Trials, Tried, Verdict
 from syncrelay.explain.try_budget import OutOfTimeError, TryBudget
@@ -95,7 +96,7 @@ def test_stamps_that_were_never_set_or_cannot_be_read_stay_so_where_the_others_a
     for place, unset in ((40, 0), (60, 0), (80, UNREADABLE)):
         lidar[place] = replace(lidar[place], stamp=unset)
     messages = sorted([*camera, *lidar], key=lambda each: each.payload)
-    trials = Trials(config, lambda: messages, as_arrays(messages, 2), is_window=True)
+    trials = Trials(config, as_arrays(messages, 2), is_window=True)
     (found,) = by_other_stamps(trials, 1).tried
     assert found.changes == (Change("clock", "device", 1), Change("delay", "42ms", 1))
     # Of the first and the last, it is not known whether a partner is still to come.
@@ -111,7 +112,7 @@ def test_a_slop_is_not_narrowed_to_how_near_mapped_stamps_came():
 
     def plan(lidar: Source) -> list[str]:
         config = group_of([CAMERA, lidar], {"slop": "20ms"})
-        trials = Trials(config, lambda: messages, as_arrays(messages, 2), is_window=False)
+        trials = Trials(config, as_arrays(messages, 2), is_window=False)
         return [each.key for each in trials.plan]
 
     assert plan(LIDAR) == ["slop"]
@@ -142,13 +143,13 @@ def test_what_was_tried_is_not_tried_again_at_once():
 
 
 class Processor:
-    """A clock of the processor that takes 1 ms each time it is read."""
+    """A clock of the processor that takes 3 ms each time it is read."""
 
     def __init__(self) -> None:
         self.now = 0
 
     def __call__(self) -> int:
-        self.now += MS
+        self.now += 3 * MS
         return self.now
 
 
@@ -217,12 +218,14 @@ def test_a_poll_interrupts_what_takes_long_and_the_next_goes_on_from_there():
 
 def test_the_first_run_of_a_poll_ends_however_slow_the_processor_is():
     budget = TryBudget(clock := Processor())
-    first = budget.spent_on(Message(0, n, None) for n in range(1000))
-    next(first)
+    messages = Messages(*np.zeros((3, 1000), dtype=np.int64))
+    first = budget.spent_on([messages])
+    begun = len(next(first).inputs)
+    assert begun < 1000
     clock.now += 1000 * MS
-    assert len(list(first)) == 999
+    assert begun + sum(len(each.inputs) for each in first) == 1000
     with pytest.raises(OutOfTimeError):
-        list(budget.spent_on(Message(0, n, None) for n in range(1000)))
+        list(budget.spent_on([messages]))
 
 
 def test_what_was_never_tried_comes_before_what_was():

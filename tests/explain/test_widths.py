@@ -7,8 +7,9 @@ import pytest
 
 from syncrelay.config import Distance
 from syncrelay.config.units import parse_duration
-from syncrelay.explain.nearest import as_arrays, sides
+from syncrelay.explain.nearest import sides
 from syncrelay.explain.possible_sets import possible_sets
+from syncrelay.explain.received import as_arrays
 from syncrelay.explain.widths import tolerances, wander, with_headroom
 from syncrelay.sync import Message
 from tests.explain.scenario import BEGAN, MS, Source, group_of

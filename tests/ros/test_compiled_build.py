@@ -1,4 +1,4 @@
-"""The compiled path is built wherever it can be, and of the source that is here."""
+"""Compiled code is built wherever it can be, and of the source that is here."""
 
 import shutil
 import subprocess
@@ -8,7 +8,7 @@ from importlib.util import find_spec
 
 import pytest
 
-from syncrelay.ros.compiled import source_fingerprint
+from syncrelay.sync.compiled import source_fingerprint
 
 _COMPILER = str(sysconfig.get_config_var("CC")).split()[0]
 _HEADERS = ("Python.h", "linux/futex.h")
@@ -23,9 +23,11 @@ def _can_be_built() -> bool:
     return subprocess.run(words, input=text, text=True, capture_output=True, check=False).returncode == 0
 
 
-def test_the_compiled_path_is_built_of_the_source_beside_it():
+@pytest.mark.parametrize("name", ["syncrelay.ros.compiled.path", "syncrelay.sync.compiled.columns"])
+def test_compiled_code_is_built_of_the_source_beside_it(name):
     if not _can_be_built():
-        pytest.skip(f"the compiled path cannot be built here: it takes {_COMPILER}, {' and '.join(_HEADERS)}")
-    assert find_spec("syncrelay.ros.compiled.path"), "it is not built, though it could be by now: pip install -e ."
-    path = import_module("syncrelay.ros.compiled.path")
-    assert source_fingerprint() == path.SOURCE, "path.pyx has changed since: make test, or pip install -e ."
+        pytest.skip(f"compiled code cannot be built here: it takes {_COMPILER}, {' and '.join(_HEADERS)}")
+    assert find_spec(name), "it is not built, though it could be by now: pip install -e ."
+    assert source_fingerprint() == import_module(name).SOURCE, (
+        "its source has changed since: make test, or pip install -e ."
+    )

@@ -2,15 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import islice
 from typing import Final
+
+import numpy as np
 
 from syncrelay.config import GroupConfig
 from syncrelay.explain.changes import Change, changed
-from syncrelay.explain.nearest import as_arrays, quantile
+from syncrelay.explain.nearest import quantile
 from syncrelay.explain.possible_sets import PossibleSets
+from syncrelay.explain.received import first, stretches
 from syncrelay.explain.trials import Trials
-from syncrelay.recordings.analysis.streams import Stream, messages, stamped
+from syncrelay.recordings.analysis.streams import Stream, stamped
 from syncrelay.sync.queues import LONGEST_QUEUE
 
 MOST_MESSAGES: Final = 50_000
@@ -61,8 +63,8 @@ def curves_of(
     """
     # Of what another policy needs, this one has the queue alone.
     base = suggested if suggested.options.policy == group.options.policy else changed(group, (_queue(suggested),))
-    used = tuple(islice(messages(stamped(base, streams)), most))
-    trials = Trials(base, lambda: used, as_arrays(used, len(streams)), is_window=False)
+    used = first(stretches([stream.as_received() for stream in stamped(base, streams)]), most)
+    trials = Trials(base, used.by_input(len(streams)), is_window=False)
     possible, slop = trials.possible(), slop_key(group)
     if possible is None or group.options.matched_by:
         return None
@@ -76,10 +78,10 @@ def curves_of(
     return Curves(
         by_slop=() if slop is None or possible.is_alone else points(slop, _slops(possible)),
         by_queue_size=points("queue_size", _sizes(group, suggested, possible)),
-        messages=len(used),
+        messages=len(used.inputs),
         recorded=sum(len(stream.places) for stream in streams),
-        lasts=used[-1].payload - used[0].payload if used else 0,
-        of=sum(message.input == possible.pivot for message in used),
+        lasts=int(used.received[-1] - used.received[0]) if len(used.inputs) else 0,
+        of=int(np.count_nonzero(used.inputs == possible.pivot)),
     )
 
 

@@ -3,26 +3,21 @@
 It is run once. What the running relay would have seen of it, once a second, is noted on the way.
 """
 
-from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
 from syncrelay.config import GroupConfig
 from syncrelay.explain import UNREADABLE, EngineDriver
+from syncrelay.explain.feeding import REASONS, Left, feed
 from syncrelay.explain.nearest import extents
+from syncrelay.explain.received import Messages, stretches
 from syncrelay.explain.rows import BLOCK, Column, Numbers, Rows
-from syncrelay.recordings.analysis.streams import Stream, stretches, transforms_beside
-from syncrelay.sync import DropReason, InputCounts, Lapse, Match, Outcome, SyncGroup
+from syncrelay.recordings.analysis.streams import Stream, transforms_beside
+from syncrelay.sync import DropReason, InputCounts, Lapse, SyncGroup
 
-REASONS: Final = tuple(DropReason)
-"""What the numbers in the rows of drops stand for."""
-
-_NUMBERS: Final = {reason: number for number, reason in enumerate(REASONS)}
-_LONGEST: Final = 2**63 - 1
 _SECOND: Final = 1_000_000_000
 # Findings speak of the last seconds: fewer than these.
 _CLOSELY: Final = 16
@@ -188,46 +183,29 @@ class Evaluation:
             yield look, sets
 
 
-def numbers_of(reasons: Iterable[DropReason]) -> list[int]:
-    """Return the numbers that stand for reasons in the rows of drops."""
-    return [_NUMBERS[reason] for reason in reasons]
-
-
 class _Outcomes:
-    """Takes what leaves an engine; the payload of a message is the time when it was received."""
+    """Takes what leaves an engine."""
 
     def __init__(self, group: GroupConfig) -> None:
         self.sets: Final = Sets(len(group.topics))
         self.drops: Final = Drops()
+        self.left: Final = Left(len(group.topics))
         self._offsets = [topic.offset_ns for topic in group.topics]
-        self._new_sets, self._new_drops = array("q"), array("q")
 
-    def take(self, outcomes: Sequence[Outcome], now: int) -> None:
-        """Take what leaves together."""
-        for outcome in outcomes:
-            if isinstance(outcome, Match):
-                complete = 0
-                for message in outcome.messages:
-                    if message is None:
-                        self._new_sets.append(UNREADABLE)
-                    else:
-                        self._new_sets.append(message.stamp)
-                        complete = max(complete, message.payload)
-                self._new_sets.append(min(now, _LONGEST))
-                self._new_sets.append(min(now - complete, _LONGEST))
-            else:
-                message = outcome.message
-                self._new_drops.extend((message.input, message.stamp, message.payload, _NUMBERS[outcome.reason]))
-        if len(self._new_sets) > BLOCK or len(self._new_drops) > BLOCK:
+    def feed(self, driver: EngineDriver, messages: Messages) -> int:
+        """Feed messages to an engine; return when the last was received."""
+        now = feed(driver, messages, self.left)
+        if len(self.left.sets) > BLOCK or len(self.left.drops) > BLOCK:
             self.flush()
+        return now
 
     def flush(self) -> None:
         """Have all in the rows."""
-        new = np.frombuffer(self._new_sets, dtype=np.int64).reshape(-1, len(self._offsets) + 2)
-        begins, ends = extents(new[:, : len(self._offsets)], self._offsets)
-        self.sets.rows.append(np.concatenate([new, (ends - begins)[:, None]], axis=1))
-        self.drops.rows.append(np.array(self._new_drops, dtype=np.int64).reshape(-1, 4))
-        self._new_sets, self._new_drops = array("q"), array("q")
+        sets, drops = self.left.taken()
+        stamps = sets[:, : len(self._offsets)]
+        begins, ends = extents(stamps, self._offsets)
+        self.sets.rows.append(np.column_stack([stamps, sets[:, len(self._offsets) + 1 :], ends - begins]))
+        self.drops.rows.append(drops)
 
 
 def evaluate(group: GroupConfig, streams: Sequence[Stream], *, until: int | None = None) -> Evaluation:
@@ -237,18 +215,18 @@ def evaluate(group: GroupConfig, streams: Sequence[Stream], *, until: int | None
     received, that takes no more than some tens of looks.
     """
     outcomes, looks = _Outcomes(group), Looks(len(group.topics))
-    driver = EngineDriver(group, outcomes.take, transforms_beside(streams))
+    driver = EngineDriver(group, outcomes.left.add, transforms_beside(streams))
     now, due = 0, None
-    for received, some in stretches(streams):
-        due = int(received[0]) + _SECOND if due is None else due
-        newest, fed = np.maximum.accumulate(received), 0
+    for some in stretches([stream.as_received() for stream in streams]):
+        due = int(some.received[0]) + _SECOND if due is None else due
+        newest, fed = np.maximum.accumulate(some.received), 0
         while (place := int(np.searchsorted(newest, due))) < len(newest):
-            driver.feed(islice(some, place - fed))
-            fed, due = place, _look_until(int(received[place]), due, driver, looks)
-        now = driver.feed(some)
+            outcomes.feed(driver, some.part(fed, place))
+            fed, due = place, _look_until(int(some.received[place]), due, driver, looks)
+        now = outcomes.feed(driver, some.part(fed, len(newest)))
     if due is not None:
         outcomes_ahead = _Outcomes(group)
-        ahead = driver.ahead(outcomes_ahead.take)
+        ahead = driver.ahead(outcomes_ahead.left.add)
         if until is not None and until >= due:
             due = _look_until(until, due, ahead, looks)
         ahead.expire(due)

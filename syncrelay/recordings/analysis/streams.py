@@ -1,15 +1,15 @@
 """The stamps of a recording, read once: all that the analysis asks for comes from these columns."""
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain, repeat
-from typing import Any, Final, TypeAlias
+from itertools import repeat
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from syncrelay.clock import DeviceClock, Step, host_times
 from syncrelay.config import GroupConfig, StampSource
-from syncrelay.explain.nearest import Received
+from syncrelay.explain.received import Received
 from syncrelay.explain.rows import Column as Numbers
 from syncrelay.explain.rows import Rows, blocks, no_numbers
 from syncrelay.recordings.bag.bindings import GroupBinding
@@ -20,8 +20,6 @@ from syncrelay.recordings.bag.columns import (
     Nanoseconds,
     ReadColumn,
     column_reader,
-    in_order,
-    keys_in_order,
     receipt_column,
     stamp_or_receipt_column,
 )
@@ -33,10 +31,6 @@ from syncrelay.recordings.bag.transforms import (
     frame_reader,
     transform_channels,
 )
-from syncrelay.sync import Message
-
-# So many messages of a group are made at a time.
-_AT_ONCE: Final = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +111,9 @@ class Stream:
 
     def as_received(self) -> Received:
         """Give the messages as they arrived, once all are read."""
-        received: Received = self.kept.setdefault("received", Received(self.stamps, self.received, self.places))
+        received: Received = self.kept.setdefault(
+            "received", Received(self.stamps, self.received, self.places, self.keys, self.frames)
+        )
         return received
 
     def add(self, column: Column, batch: Batch, begin: int) -> None:
@@ -181,41 +177,6 @@ def read_topics(recording: Recording) -> tuple[tuple[Channel, Stream], ...]:
     ]
     _pour(recording, filled)
     return tuple((readers[0][0], stream) for stream, readers in filled)
-
-
-def messages(streams: Sequence[Stream]) -> Iterator[Message]:
-    """Yield the messages of a group's inputs in the order of the recording; the payload is the time of receipt."""
-    return chain.from_iterable(some for _, some in stretches(streams))
-
-
-def stretches(streams: Sequence[Stream]) -> Iterator[tuple[Nanoseconds, Iterator[Message]]]:
-    """Yield the times of receipt of some thousand messages at a time, and those messages."""
-    at = [0] * len(streams)
-    while any(begin < len(stream.places) for begin, stream in zip(at, streams, strict=True)):
-        ends = [begin + _AT_ONCE for begin in at]
-        parts = [stream.places[begin:end] for stream, begin, end in zip(streams, at, ends, strict=True)]
-        # Up to here no later part has an earlier message.
-        rest = [part[-1] for part, end, stream in zip(parts, ends, streams, strict=True) if end < len(stream.places)]
-        until = min(rest, default=None)
-        counts = [len(part) if until is None else int(np.searchsorted(part, until, side="right")) for part in parts]
-        among = [slice(begin, begin + count) for begin, count in zip(at, counts, strict=True)]
-        yield _merged(streams, among, [part[:count] for part, count in zip(parts, counts, strict=True)])
-        at = [each.stop for each in among]
-
-
-def _merged(
-    streams: Sequence[Stream], among: Sequence[slice], places: Sequence[Nanoseconds]
-) -> tuple[Nanoseconds, Iterator[Message]]:
-    order, inputs = in_order(places)
-    parts = list(zip(streams, among, places, strict=True))
-    stamps = np.concatenate([stream.stamps[part] for stream, part, _ in parts])[order].tolist()
-    received = np.concatenate([stream.received[part] for stream, part, _ in parts])[order]
-    keys = keys_in_order([(stream.keys and stream.keys[part], len(at)) for stream, part, at in parts], order)
-    frames: Any = keys_in_order([(stream.frames and stream.frames[part], len(at)) for stream, part, at in parts], order)
-    if keys is None and frames is None:
-        return received, map(Message, inputs.tolist(), stamps, received.tolist())
-    beside = keys or repeat(None), frames or repeat(None)
-    return received, map(Message, inputs.tolist(), stamps, received.tolist(), *beside)
 
 
 def transforms_beside(streams: Sequence[Stream]) -> RecordedTransforms | None:

@@ -18,7 +18,7 @@ from syncrelay.explain.rules_transforms import enough_wait
 from syncrelay.explain.trials import Trials
 from syncrelay.recordings.analysis.changes import Change
 from syncrelay.recordings.analysis.evaluation import Evaluation, evaluate
-from syncrelay.recordings.analysis.streams import Stream, messages, stamped
+from syncrelay.recordings.analysis.streams import Stream, stamped
 from syncrelay.recordings.analysis.topics import TopicFigures, figures_of
 
 _US: Final = 1_000
@@ -52,9 +52,7 @@ def trials_of(group: GroupConfig, streams: Sequence[Stream], evaluation: Evaluat
     options = group.options
     is_alike = options.every == 1 and not options.max_rate and options.transforms is None and group.ticks is None
     sets = evaluation.sets.rows.blocks if evaluation is not None and is_alike else None
-    return Trials(
-        group, lambda: messages(streams), [each.as_received() for each in streams], is_window=False, sets=sets
-    )
+    return Trials(group, [each.as_received() for each in streams], is_window=False, sets=sets)
 
 
 def suggest(

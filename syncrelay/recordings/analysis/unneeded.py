@@ -11,9 +11,11 @@ import numpy.typing as npt
 
 from syncrelay.config import GroupConfig
 from syncrelay.explain import FOR_WANT_OF_A_PARTNER, UNREADABLE
-from syncrelay.explain.nearest import Received, in_order, shifted
+from syncrelay.explain.feeding import REASONS, numbers_of
+from syncrelay.explain.nearest import in_order, shifted
+from syncrelay.explain.received import Received
 from syncrelay.explain.rows import Column, Rows
-from syncrelay.recordings.analysis.evaluation import REASONS, Drops, Evaluation, numbers_of
+from syncrelay.recordings.analysis.evaluation import Drops, Evaluation
 from syncrelay.recordings.bag.columns import Nanoseconds
 from syncrelay.sync import DropReason
 

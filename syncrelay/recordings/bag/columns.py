@@ -11,12 +11,12 @@ import numpy.typing as npt
 from syncrelay.cdr import LATEST_STAMP, read_stamp
 from syncrelay.clock import UNREADABLE, DeviceClock, host_times
 from syncrelay.config import GroupConfig, StampSource
+from syncrelay.explain.received import Places, by_place, joined
 from syncrelay.recordings.bag.definitions import begins_with_header
 from syncrelay.recordings.bag.payloads import ReadMessage, ReadStamp, message_reader, read_ros1_stamp, stamp_reader
 from syncrelay.recordings.bag.recording import Channel, Encoding, RawMessage
 
 Nanoseconds: TypeAlias = npt.NDArray[np.int64]
-Places: TypeAlias = npt.NDArray[np.intp]
 Heads: TypeAlias = npt.NDArray[np.void]
 """The first bytes of each payload, up to the end of a leading Header's stamp."""
 
@@ -175,7 +175,7 @@ class Columns:
         if not found:
             return iter(())
         inputs, columns = list(found), list(found.values())
-        order, of = in_order([column.places for column in columns])
+        order, of = by_place([column.places for column in columns])
         whole = _joined(columns, order)
         return zip(
             np.array(inputs)[of].tolist(),
@@ -196,7 +196,7 @@ def _combined(columns: Sequence[Column]) -> Column:
     """Merge the messages of several channels by their places."""
     if len(columns) == 1:
         return columns[0]
-    order, _ = in_order([each.places for each in columns])
+    order, _ = by_place([each.places for each in columns])
     return _joined(columns, order)
 
 
@@ -205,24 +205,5 @@ def _joined(columns: Sequence[Column], order: Places) -> Column:
     return Column(
         np.concatenate([each.places for each in columns])[order],
         np.concatenate([each.stamps for each in columns])[order],
-        keys_in_order([(each.keys, len(each.places)) for each in columns], order),
+        joined([(each.keys, len(each.places)) for each in columns], order),
     )
-
-
-def in_order(places: Sequence[Places]) -> tuple[Places, Places]:
-    """Return the order that sorts concatenated columns by place, and the column that each message then comes from.
-
-    For equal places, the earlier column comes first.
-    """
-    order = np.argsort(np.concatenate(places), kind="stable")
-    return order, np.repeat(np.arange(len(places)), [len(each) for each in places])[order]
-
-
-def keys_in_order(columns: Sequence[tuple[Sequence[Hashable] | None, int]], order: Places) -> Sequence[Hashable] | None:
-    """Concatenate and reorder the keys of columns, given with their lengths; None if no column has keys."""
-    if all(keys is None for keys, _ in columns):
-        return None
-    joined: list[Hashable] = []
-    for keys, length in columns:
-        joined += [None] * length if keys is None else keys
-    return [joined[at] for at in order.tolist()]

@@ -142,8 +142,12 @@ cdef class Deliver:
         return 0
 
 
-include "lent.pxi"
-include "searched.pxi"
+cdef inline object received_of(object payload):
+    return payload.received
+
+
+include "../../sync/compiled/lent.pxi"
+include "../../sync/compiled/searched.pxi"
 
 cdef enum:
     # So many sets leave before an engine is asked again that had to match itself.

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from syncrelay.explain import UNREADABLE
+from syncrelay.explain.feeding import REASONS
 from syncrelay.explain.rows import extent, quantiles
 from syncrelay.recordings.analysis import GroupAnalysis
-from syncrelay.recordings.analysis.evaluation import REASONS
 from syncrelay.recordings.bag.columns import Nanoseconds
 from syncrelay.status.fates import CODES, MATCHED, UNNEEDED
 

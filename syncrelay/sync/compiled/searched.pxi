@@ -7,6 +7,8 @@ ctypedef struct Queue:
     Py_ssize_t length, cursor
     int64_t newest, given, least_period, fed
     int64_t dropped[WAYS]
+    # The way in which the first was dropped.
+    int first
 
 ctypedef struct Head:
     int64_t stamp
@@ -61,10 +63,11 @@ cdef class Searched(Lent):
             queue, messages = &self.queues[place], search.queues[place]
             queue.newest, queue.given = min(search.newest[place], INT64_MAX), -INT64_MAX
             queue.fed = queue.dropped[SUPERSEDED] = queue.dropped[TOO_FAR] = 0
+            queue.first = SUPERSEDED
             queue.length, queue.cursor = len(messages), search.cursors[place]
             self.payloads[place] = [message.payload for message in messages]
             for n, message in enumerate(messages):
-                queue.stamps[n], queue.received[n] = message.stamp, message.payload.received
+                queue.stamps[n], queue.received[n] = message.stamp, received_of(message.payload)
             self._add_head(place)
         self.pivot = -1
         if search.candidate is not None:
@@ -80,7 +83,8 @@ cdef class Searched(Lent):
         for place in range(self.n_inputs):
             queue, payloads = &self.queues[place], self.payloads[place]
             queues.append([Message(place, queue.stamps[n], payloads[n]) for n in range(queue.length)])
-            dropped = {_REASONS[n]: queue.dropped[n] for n in (SUPERSEDED, TOO_FAR) if queue.dropped[n]}
+            ways = (queue.first, SUPERSEDED + TOO_FAR - queue.first)
+            dropped = {_REASONS[n]: queue.dropped[n] for n in ways if queue.dropped[n]}
             inputs.append(Fed(queue.fed, dropped, queue.given))
             self.payloads[place] = []
         cursors = [self.queues[place].cursor for place in range(self.n_inputs)]
@@ -214,7 +218,9 @@ cdef class Searched(Lent):
         cdef Queue * queue = &self.queues[place]
         cdef Py_ssize_t n
         for n in range(count):
-            self.note_left(way, place, queue.stamps[n], 0)
+            self.note_left(way, place, queue.stamps[n], queue.received[n])
+        if not queue.dropped[SUPERSEDED] + queue.dropped[TOO_FAR]:
+            queue.first = way
         queue.dropped[way] += count
         self._shift(place, count)
         return 0

@@ -1,5 +1,7 @@
 """Sets formed in arrays, in place of an engine that lends its messages; see SyncGroup.lend and lend_search.
 
+Included where messages come from: there `received_of` says when a payload was received.
+
 Code that runs once in some milliseconds finds nothing in the processor's caches, so it costs by how much memory it
 touches. Here a message is a row in an array, and becomes objects of Python when somebody asks what came and left.
 """
@@ -42,7 +44,7 @@ ctypedef struct Came:
     int64_t received
 
 # A set is as many of these as there are inputs. The last has when its newest message was received until it is
-# published, and its latency afterwards.
+# published, and its latency afterwards. What left without a set has when it was received itself.
 ctypedef struct Left:
     int way
     Py_ssize_t index
