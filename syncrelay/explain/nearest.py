@@ -18,6 +18,8 @@ Nanoseconds: TypeAlias = npt.NDArray[np.int64]
 
 # More than arrives between two polls at 1 kHz. Of an input whose partner is silent, no more are kept.
 _KEPT: Final = 5_000
+# So many partners are looked for in arrays, fewer in plain Python.
+_MANY: Final = 128
 FAR: Final = 2**61
 """Stands for "no message on this side". Twice this still fits into 64 bits."""
 
@@ -140,6 +142,14 @@ def tightest_spans(count: int, found: Sequence[Sides]) -> tuple[Nanoseconds, Nan
     return best, best_left
 
 
+def ages(count: int, found: Sequence[Sides]) -> tuple[Nanoseconds, Nanoseconds]:
+    """Return how much older the oldest of the latest not newer messages is than each of so many; twice, as the left."""
+    oldest = np.zeros(count, dtype=np.int64)
+    for each in found:
+        oldest = np.maximum(oldest, each.before)
+    return oldest, oldest
+
+
 def period_of(stamps: Column) -> float:
     """Return the usual time between stamps in order, 0 where most are equal or there is only one."""
     return median(lambda: steps(stamps)) if len(stamps) > 1 else 0.0
@@ -148,12 +158,14 @@ def period_of(stamps: Column) -> float:
 class NearestSpans:
     """Measures the tightest set of each message of one input once, as soon as no later message can change it.
 
-    In plain Python: of tens of messages between two polls arrays take twice as long and more, and of a thousand half.
+    In plain Python where few came between two polls: of tens of messages, arrays take twice as long and more. Of
+    hundreds they take a fifth to a half.
     """
 
     def __init__(self, n_inputs: int, distance: Distance = Distance.SPAN) -> None:
         is_age = distance is Distance.AGE
         self._measure = _age if is_age else _tightest_span
+        self._measure_all = ages if is_age else tightest_spans
         self._measure_one: Callable[[tuple[int, int]], int] = itemgetter(0) if is_age else min
         self._stamps: list[list[int]] = [[] for _ in range(n_inputs)]
         self._measured_until: int | None = None
@@ -185,6 +197,9 @@ class NearestSpans:
         others = [each for each in self._stamps if each[bisect_left(each, begin) : bisect_right(each, end)] != pivots]
         if not others:
             spans = [0] * len(pivots)
+        elif len(pivots) * len(others) >= _MANY and all(each[0] > -FAR and each[-1] < FAR for each in others):
+            found = [sides(np.array(pivots), np.array(each)) for each in others]
+            spans = self._measure_all(len(pivots), found)[0].tolist()
         elif len(others) == 1:
             # As of most groups, and without the list of its sides.
             spans = [self._measure_one(_side(others[0], stamp)) for stamp in pivots]

@@ -14,6 +14,7 @@ from syncrelay.explain.nearest import (
     FAR,
     Nanoseconds,
     Sides,
+    ages,
     in_order,
     period_of,
     shifted,
@@ -118,7 +119,7 @@ def _sets_around(pivots: InOrder, others: Sequence[InOrder], *, successors: int,
         stamps = pivots.stamps[begin : begin + BLOCK]
         near = [_near(each, stamps) for each in others]
         found = [sides(stamps, each.stamps[:]) for each, _ in near]
-        spans, left = _ages(len(stamps), found) if is_age else tightest_spans(len(stamps), found)
+        spans, left = ages(len(stamps), found) if is_age else tightest_spans(len(stamps), found)
         chosen = [
             np.clip(np.where((each.before <= left) & (each.after != 0), each.at - 1, each.at), 0, len(other.stamps) - 1)
             for each, (other, _) in zip(found, near, strict=True)
@@ -179,14 +180,6 @@ def _ages_at(ticks: Nanoseconds, messages: Received, offset: int, max_wait: int)
     latest, at = np.maximum.accumulate(stamps[order]), np.searchsorted(usable[order], ticks, side="right")
     ages: Nanoseconds = np.where(at > 0, np.minimum(ticks - latest[np.maximum(at - 1, 0)], FAR), FAR)
     return ages
-
-
-def _ages(count: int, found: Sequence[Sides]) -> tuple[Nanoseconds, Nanoseconds]:
-    """Return how much older the oldest of the latest not newer messages is than each of so many; twice, as the left."""
-    oldest = np.zeros(count, dtype=np.int64)
-    for each in found:
-        oldest = np.maximum(oldest, each.before)
-    return oldest, oldest
 
 
 def _queues(chosen: Sequence[tuple[InOrder, Nanoseconds]], *, successors: int) -> Nanoseconds:

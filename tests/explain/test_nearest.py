@@ -69,7 +69,10 @@ def test_it_is_what_a_search_through_all_sets_finds_in_whatever_chunks_the_stamp
     pivot = cases.draw(st.integers(0, len(streams) - 1))
     nearest = NearestSpans(len(streams), distance)
     chunks = cases.draw(chunked(streams))
-    assert [span for chunk in chunks for span in nearest.add(chunk, pivot=pivot)] == reference(streams, pivot)
+    with pytest.MonkeyPatch.context() as patched:
+        # In plain Python, and in arrays.
+        patched.setattr("syncrelay.explain.nearest._MANY", cases.draw(st.sampled_from((1, 1000))))
+        assert [span for chunk in chunks for span in nearest.add(chunk, pivot=pivot)] == reference(streams, pivot)
 
 
 @given(stamps=STAMPS, others=STAMPS)
@@ -141,3 +144,9 @@ def test_what_piles_up_while_an_input_is_silent_is_bounded():
 def test_an_offset_does_not_turn_the_latest_stamp_into_the_earliest():
     (stamps, *_) = as_arrays([Message(0, 2**63 - 1, BEGAN)], 1)
     assert shifted(stamps.stamps[:], 1)[0] > 0
+
+
+def test_stamps_beyond_64_bits_are_measured_like_any_others():
+    nearest = NearestSpans(2)
+    stamps = [2**80 + number * 10 for number in range(1000)]
+    assert nearest.add([stamps, [stamp + 1 for stamp in stamps]], pivot=1) == [1] * 999
