@@ -235,7 +235,7 @@ def draw(seed: int, kinds: Mapping[str, Sequence[str]]) -> Plan:
     steps = tuple(sorted(_steps(chance, plan, kinds, first, chaotic=chaotic)))
     last = max((step.at + step.seconds for step in steps), default=SETTLED_S)
     # It may end amid all that, or when all of it is long over.
-    rest = chance.choice([chance.uniform(0, 20), HEALED_S + 15]) if chaotic else HEALED_S + 15
+    rest = chance.choice([chance.uniform(0, 20), *2 * [HEALED_S + 15]]) if chaotic else HEALED_S + 15
     return replace(plan, steps=steps, length=last + rest)
 
 
@@ -307,6 +307,8 @@ def _steps(
     # A few kinds again and again meet in more ways than one of each.
     begin = [first] if first in fit else []
     fit = [*begin, *chance.sample(fit, k=chance.choice([4, 8, len(fit)]))] if chaotic else fit
+    # What happened within a minute is seen longest where all of it was at its begin.
+    within = chance.choice([20.0, 60.0])
     for _ in range(chance.randint(4, 14) if chaotic else chance.choice([1, 1, 2, 3])):
         kind = begin.pop() if begin else chance.choice(fit)
         target = ""
@@ -316,8 +318,8 @@ def _steps(
             target = chance.choice(plan.groups).name
         is_brief = "brief" in kinds[kind]
         if chaotic:
-            at = 0.0 if "start" in kinds[kind] else chance.uniform(2, 60)
-            seconds = chance.choice([0.3, 3.0, chance.uniform(0, 30)])
+            at = 0.0 if "start" in kinds[kind] else chance.uniform(2, within)
+            seconds = chance.choice([0.3, 3.0, chance.uniform(0, within / 2)])
             yield Step(at, kind, target, 0.0 if is_brief else seconds)
             continue
         seconds = 0.0 if is_brief else chance.uniform(NAMED_S + 5, NAMED_S + 25)

@@ -4,7 +4,7 @@ import logging
 import re
 from bisect import bisect_left
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil
@@ -75,7 +75,8 @@ _SUBSCRIBES_AGAIN: Final = frozenset(
         "restarts",
     }
 )
-# Groups end, and are made anew: not while that is refused.
+# Groups are made by then, and anew by these.
+_MADE_BY_S: Final = 10.0
 _MADE_ANEW: Final = frozenset({"configure_again", "reload_without"})
 _RETURNS: Final = frozenset({"dies", "dies_in_write", "leaves", "other_type", "restarts"})
 # Before its messages have come for a while, nothing is known of a group but what the graph shows.
@@ -417,7 +418,12 @@ class Promises:
     def _spoilt_of(self, group: Group) -> list[tuple[float, float]]:
         """Return the times in which sets of a group may be missing."""
         plan = self.world.plan
-        spoiling = [step for step in plan.steps if KINDS[step.kind].spoils and concerns(step.kind, step.target, group)]
+        spoiling = [
+            step
+            for step in plan.steps
+            if KINDS[step.kind].spoils
+            and (concerns(step.kind, step.target, group) or self._keeps_groups_from_being_made(step))
+        ]
         if group.quorum and not _overlap(spoiling):
             # There is always one more than a set needs.
             spoiling = [step for step in spoiling if step.kind not in _ONE_IS_AWAY]
@@ -427,9 +433,14 @@ class Promises:
         for step in spoiling:
             # What waits for the next message waits for a second at most.
             kind, end = KINDS[step.kind], step.at + step.seconds + plan.prompt
-            at_end = kind.at_end and not self._happened(_MADE_ANEW, step.at, end)
+            at_end = kind.at_end and not self._keeps_groups_from_being_made(step)
             times.append(((end if at_end else step.at) - _BEFORE_S, end + max(at_least, kind.again_s)))
         return [(0.0, SETTLED_S), *times]
+
+    def _keeps_groups_from_being_made(self, step: Step) -> bool:
+        """Whether groups are made, at first or anew, while none can be exchanged."""
+        end = step.at + step.seconds + self.world.plan.prompt
+        return KINDS[step.kind].at_end and (step.at < _MADE_BY_S or self._happened(_MADE_ANEW, step.at, end))
 
     def _is_calm(self, group: Group, at: float) -> bool:
         return not any(begin <= at <= end for begin, end in self._spoilt[group.name])
@@ -498,7 +509,8 @@ class Promises:
                 return
             begin = bisect_left(times, seen.at - share_s)
             is_bad = seen.code in _SETS_ARE_MISSING and end - begin > (share_s - _LATE_S) * hz - 3
-            if not is_bad or not self._is_calm(group, seen.at) or self._happened(_BETWEEN, seen.at - HEALED_S, seen.at):
+            ended = seen.at - share_s - _AGAIN_S
+            if not is_bad or not self._is_calm(group, seen.at) or self._happened(_BETWEEN, ended, seen.at):
                 continue
             if all(each.left is not None and each.left < seen.at for each in moments[begin:end]):
                 what = f"{end - begin} of {end - begin} sets left in the last {share_s:g} s"
@@ -525,8 +537,7 @@ class Promises:
     def _false_findings(self, group: Group) -> Iterator[str]:
         plan = self.world.plan
         steps = [step for step in plan.steps if concerns(step.kind, step.target, group)]
-        # What befalls a group at once may be told as anything; once all is over and healed, it is well.
-        told_from = max(step.at + step.seconds + plan.prompt for step in steps) + HEALED_S if _overlap(steps) else 0.0
+        told_from, lasting = self._once_healed(steps)
         for seen in self.seen[group.name]:
             if seen.at > plan.length:
                 return
@@ -542,9 +553,7 @@ class Promises:
                 continue
             yield from self._of_another_time(group, seen)
             near = [step for step in steps if step.at - 1 <= seen.at <= step.at + step.seconds + HEALED_S]
-            # Who has sent twice as often for most of the time has slowed down since, for good.
-            near += [step for step in steps if told_from and step.kind == "doubles"]
-            allowed = self._allowed(group, near, seen.at)
+            allowed = self._allowed(group, near, seen.at) | lasting
             what = f"{seen.at:.2f} s: {group.name}: {seen.code}: {seen.text}"
             if seen.code not in allowed:
                 yield f"{what}\n    is not so; allowed: {sorted(allowed)}"
@@ -566,6 +575,17 @@ class Promises:
                 ):
                     yield f"{what}\n    is about {sorted(seen.about)} and not {step.target}"
                     return
+
+    def _once_healed(self, steps: Sequence[Step]) -> tuple[float, frozenset[str]]:
+        """Return from when on a group is told truly, and what is so for good.
+
+        What befalls it at once may be told as anything; once all is over and healed, it is well.
+        """
+        if not _overlap(steps):
+            return 0.0, frozenset()
+        # Who has sent twice as often for most of the time has slowed down since.
+        lasting = frozenset({"slowed"}) if any(step.kind == "doubles" for step in steps) else frozenset()
+        return max(step.at + step.seconds for step in steps) + self.world.plan.prompt + HEALED_S, lasting
 
     def _had_two_paces(self, step: Step) -> bool:
         """Whether a sensor has had another pace than its own lately, and so no steady one that it could fall below."""
