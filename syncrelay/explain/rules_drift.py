@@ -64,13 +64,20 @@ def may_drift(facts: GroupFacts) -> bool:
     moves = needed * (facts.figures.now - measured_at[0]) if measured_at else 0
     if nearest.quantile(_USUAL) - nearest.quantile(1 - _USUAL) < _MATTERS * moves:
         return False
-    is_urgent = (facts.silent_for if facts.is_silent else watched) >= _DRIFT_PROVEN_SILENT
+    is_urgent = (_missing_for(facts, tolerance.ns) if facts.is_silent else watched) >= _DRIFT_PROVEN_SILENT
     if facts.by_stamp and not is_urgent and any(each.required and each.figures.drift is None for each in facts.inputs):
         return True
     return any(
         abs(each.slope) >= max(needed, each.error) or (not is_urgent and abs(each.slope) + each.error >= needed)
         for each in _between(_drifts(facts)).values()
     )
+
+
+def _missing_for(facts: GroupFacts, limit: int) -> int:
+    """Return for how long sets have been missing: by chance a few left meanwhile, while most were too wide."""
+    figures = facts.figures
+    are_wide = figures.nearest_at and 2 * figures.nearest.share_over(limit) > 1
+    return max(facts.silent_for, figures.now - figures.nearest_at[0] if are_wide else 0)
 
 
 def clock_drift(facts: GroupFacts) -> Found:

@@ -181,3 +181,11 @@ def test_what_is_sent_again_after_a_standstill_is_missed_because_of_it(again_s, 
     )
     assert told.ever_found <= {"too_slow"}
     assert told.codes == {"too_slow"}
+
+
+def test_sets_that_leave_by_chance_put_off_no_advice():
+    pair = Source("/a", 10, jitter_ms=0.2, delay_jitter_ms=0.3), Source("/b", 10, jitter_ms=0.3, delay_jitter_ms=0.3)
+    told = run(*pair, seconds=30, options={"slop": "20us"})
+    late = [line.text for line in told.lines if line.second > 20]
+    assert late
+    assert not [text for text in late if "wait some seconds" in text]
