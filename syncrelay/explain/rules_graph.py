@@ -344,8 +344,15 @@ def _is_enough(facts: GroupFacts, an_input: InputFacts, quiet: int) -> bool:
 
 
 def _or_hold_longer(facts: GroupFacts, index: int) -> str:
-    tolerance = facts.tolerance_of(index)
-    if tolerance is None or not facts.is_held(index):
-        return ""
-    age = words.duration(tolerance.ns)
-    return f"; if it is meant to be sent this rarely, write a `{tolerance.key}` larger than {age} for it"
+    tolerance, rarely = facts.tolerance_of(index), "; if it is meant to be sent this rarely, write"
+    if facts.is_held(index):
+        return (
+            ""
+            if tolerance is None
+            else f"{rarely} a `{tolerance.key}` larger than {words.duration(tolerance.ns)} for it"
+        )
+    is_trigger = index == facts.trigger or not facts.by_stamp
+    # What has ever had a rate has died.
+    return (
+        "" if is_trigger or facts.inputs[index].figures.usual_hz else f"{rarely} `policy: latest_time`, which holds it"
+    )

@@ -246,16 +246,16 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
     """Tell stamps that fit no set, and messages that come after theirs has left."""
     name, tolerance, nearest = an_input.name, facts.tolerance, an_input.figures.nearest
     about, behind = (Code.WAITING_FOR_OPTIONAL, index), _behind(facts, an_input)
-    if tolerance is None or len(nearest) < _FEWEST:
-        found = _verdict(facts, about, lambda trials: trials.verdict(index, _QUEUE))
-        return "", _advice(facts, found, name) or f"check whether messages of {name} arrive late or are lost"
-    if abs(behind) > max(SECOND, tolerance.ns):
+    if tolerance is not None and abs(behind) > max(SECOND, tolerance.ns):
         found = _verdict(facts, about, lambda trials: _in_time(index, trials))
         side = "behind" if behind > 0 else "ahead of"
         return (
             f": its stamps are {words.span_of_time(abs(behind))} {side} those of the others",
             f"synchronize their clocks{_or(_advice(facts, found, name))}",
         )
+    if tolerance is None or len(nearest) < _FEWEST:
+        found = _verdict(facts, about, lambda trials: trials.verdict(index, _QUEUE))
+        return "", _advice(facts, found, name) or f"check whether messages of {name} arrive late or are lost"
     if nearest.quantile(0.5) > tolerance.ns:
         widths = f"{words.duration(nearest.quantile(0))} to {words.duration(nearest.quantile(0.95))}"
         found = _verdict(facts, about, lambda trials: _wide_enough(facts, tolerance, nearest, trials, index))

@@ -32,6 +32,7 @@ FOUND = {
         delay=45 * MS, nearest=Distribution([40 * MS] * 99 + [63 * MS])
     ),
     "an optional input of another clock": without_camera(delay=37_205 * MS, nearest=Distribution([40 * MS] * 100)),
+    "an optional input of another clock that was never near": without_camera(delay=37_205 * MS),
     "an optional input that comes late": without_camera(delay=305 * MS, nearest=Distribution([3 * MS] * 100)),
     "an optional input that comes late, and seldom": without_camera(
         delay=305 * MS, nearest=Distribution([3 * MS] * 100), rate_hz=2.0, usual_hz=2.0, pace_hz=2.0

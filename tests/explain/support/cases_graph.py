@@ -98,6 +98,7 @@ FOUND = {
     ),
     "nothing came lately": a_silent_group(camera(figures={**ONCE, "last_received": None}), LIDAR),
     "nothing comes any more": a_silent_group(camera(figures=QUIET), LIDAR),
+    "something was sent once that only latest_time holds": a_silent_group(camera(figures=ONCE), LIDAR),
     "nothing came for long": a_silent_group(camera(figures={**QUIET, "last_received": NOW - 21 * S}), LIDAR),
     "nothing of what is held comes any more, which always came": a_group(camera(figures=QUIET), LIDAR, **AGES),
     "what was sent once is too old": a_silent_group(
