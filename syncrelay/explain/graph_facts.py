@@ -95,7 +95,8 @@ class InputGraph:
 
     `name` is the topic's in the graph, `output` that under which its messages leave, `not_importable` says why its type
     cannot be used here, `not_readable` why the stamp or key that the file names cannot be read from it, `refusal` what
-    DDS does not make or publish for it, `alike` are topics of the graph that may have been meant. DDS recently lost
+    DDS does not make or publish for it, `alike` are topics of the graph that may have been meant, `managed` those of
+    its publishers that are managed nodes, or, of none, the managed nodes that publish nothing yet. DDS recently lost
     `lost` messages on the way, and `lost_in_all` since the relay follows the topic. `senders` are those that publish
     it, by their nodes, none where messages do not say whose they are. `profile` is what the relay subscribes with.
     `type_from` is the publisher, or one of several, whose type was taken because the file has none, None while there is
@@ -108,6 +109,7 @@ class InputGraph:
     publishers: tuple[Endpoint, ...] = ()
     subscribers: tuple[Endpoint, ...] = ()
     alike: tuple[str, ...] = ()
+    managed: tuple[str, ...] = ()
     not_importable: str | None = None
     not_readable: str | None = None
     refusal: Refusal | None = None

@@ -21,6 +21,8 @@ _AS_LONG: Final = 0.8
 _MISSED_PERIODS: Final = 2
 # Inputs that fell silent within this time did so together.
 _TOGETHER: Final = 2 * SECOND
+# So many names are read in a sentence.
+_FEW: Final = 3
 # A pause is reported if it is this many times the longest before.
 _PAUSES: Final = 3
 
@@ -168,14 +170,24 @@ def _never_published(facts: GroupFacts, missing: Sequence[InputFacts]) -> tuple[
         if meant:
             published = f" It is published as {only.type}" if only.type else ""
             return text, f"did you mean `topic: {meant[only.name]}`?{published}"
-        return text, f"start the node that publishes {only.name}, or correct the topic's name"
+        return text, f"start the node that publishes {only.name}, or correct the topic's name{_or_configure(only)}"
     text = f"nobody publishes {one_of(each.name for each in missing)}"
     if (moved := _in_another_namespace(missing)) is not None:
         namespace, names = moved
         return text, f"{all_of(names)} are published; did you mean namespace {namespace}?"
     pairs = [f"{there} for {name}" for name, there in meant.items()]
     hint = f"did you mean {all_of(pairs)}? Otherwise " if pairs else ""
-    return text, f"{hint}start the nodes that publish them, or correct the topics' names"
+    return text, f"{hint}start the nodes that publish them, or correct the topics' names{_or_configure(missing[0])}"
+
+
+def _or_configure(an_input: InputFacts) -> str:
+    if not (managed := an_input.graph.managed):
+        return ""
+    some = all_of(managed) if len(managed) <= _FEW else f"{len(managed)} managed nodes, as {managed[0]},"
+    verb = "publishes" if len(managed) == 1 else "publish"
+    return (
+        f"; {some} {verb} nothing yet, and may have to be configured and activated: `ros2 lifecycle get {managed[0]}`"
+    )
 
 
 def _of_type(an_input: InputFacts) -> str:
@@ -286,12 +298,14 @@ def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Fault | None
         # It may be about to send.
         return None
     node, quiet = fitting[0].node, now - (figures.last_received or now)
+    is_managed = node in an_input.graph.managed
+    state = f"check with `ros2 lifecycle get {node}` whether it is active; if so, " if is_managed else ""
     if figures.last_received is None and not figures.fed:
         lately = " lately" if an_input.counts.fed else ""
         return Fault(
             f"{node} publishes {an_input.name}, but no message has arrived{lately}",
-            f"check with `ros2 topic hz {an_input.name}` whether {node} is sending; if so, run `syncrelay doctor"
-            " --config FILE --live`",
+            f"{state}check with `ros2 topic hz {an_input.name}` whether {node} is sending; if so,"
+            " run `syncrelay doctor --config FILE --live`",
             absence(facts, an_input),
             input=index,
         )
@@ -305,7 +319,7 @@ def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Fault | None
         f"{an_input.name} has been silent for {words.seconds(quiet)}{until_then}",
         f"check whether recording of {an_input.name} stopped"
         if facts.is_recorded
-        else f"check {node}, which {_is_there(facts, an_input, quiet)}{_or_hold_longer(facts, index)}",
+        else f"{state}check {node}, which {_is_there(facts, an_input, quiet)}{_or_hold_longer(facts, index)}",
         absence(facts, an_input),
         input=index,
     )

@@ -17,6 +17,9 @@ from syncrelay.relay.ports import EndpointInfo, Graph, Node, NodeName
 # Every node publishes these.
 _OF_EVERY_NODE: Final = ("/parameter_events", "/rosout")
 _CLOCK: Final = "/clock"
+# Every managed node publishes this.
+_STATE: Final = "/transition_event"
+_STATE_TYPE: Final = "lifecycle_msgs/msg/TransitionEvent"
 # How alike the names of two topics must be, as difflib measures it.
 _ALIKE: Final = 0.5
 
@@ -100,6 +103,19 @@ def published_topics(graph: Graph) -> dict[str, Sequence[EndpointInfo]]:
     shown = (name for name in topics_in(graph) if name not in _OF_EVERY_NODE and not _is_hidden(name))
     found = ((name, graph.publishers_of(name)) for name in shown)
     return {name: publishers for name, publishers in found if publishers}
+
+
+def managed_nodes(node: Node) -> dict[str, bool]:
+    """Return the full names of the other managed nodes, and whether they publish nothing yet beside their state."""
+    states = (name for name, types in topics_in(node.graph).items() if _STATE_TYPE in types)
+    names = (name.removesuffix(_STATE) for name in states if name.endswith(_STATE))
+    found = {}
+    for name in names:
+        namespace, _, own = name.rpartition("/")
+        published = node.graph.published_by(NodeName(own, namespace or "/"))
+        found[name] = published.keys() <= {*_OF_EVERY_NODE, f"{name}{_STATE}"}
+    found.pop(node.name, None)
+    return found
 
 
 def _is_hidden(name: str) -> bool:

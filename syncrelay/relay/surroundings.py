@@ -37,6 +37,8 @@ class Surroundings:
         self._around: dict[InputBinding | BundleOutput, _Around] = {}
         self._alike: dict[InputBinding, tuple[str, ...]] = {}
         self._rivals_since: dict[InputBinding | BundleOutput, int] = {}
+        self._managed: dict[InputBinding, tuple[str, ...]] = {}
+        self._managed_nodes: dict[str, bool] | None = None
         self._relayed: dict[str, bool] = {}
         self._published: dict[str, tuple[tuple[str, ...], Sequence[EndpointInfo]]] | None = None
 
@@ -51,6 +53,7 @@ class Surroundings:
         """Poll the graph again for each, as it has changed."""
         self._around.clear()
         self._alike.clear()
+        self._managed_nodes = None
         self._relayed.clear()
         self._published = None
 
@@ -72,6 +75,7 @@ class Surroundings:
                 publisher, profile = binding.output.bundle.publisher, binding.output.bundle.profile
             around = self._around[binding] = self._poll(binding, binding.output.topic, publisher, profile)
             self._alike[binding] = () if topic.publishers else self._topics_alike(topic.name, topic.type)
+            self._managed[binding] = self._managed_by(topic.publishers)
         return InputGraph(
             name=topic.name,
             output=around.name,
@@ -80,6 +84,7 @@ class Surroundings:
             rivals=around.rivals,
             rivals_since=around.rivals_since,
             alike=self._alike[binding],
+            managed=self._managed[binding],
             not_importable=topic.not_importable,
             not_readable=binding.output.not_readable,
             refusal=binding.refusal or _unpublished(binding, around.name),
@@ -109,6 +114,14 @@ class Surroundings:
             rivals,
             self._rivals_since.setdefault(output, self._runtime.time_ns()) if rivals else 0,
         )
+
+    def _managed_by(self, publishers: Sequence[Endpoint]) -> tuple[str, ...]:
+        """Return those of the publishers that are managed nodes; of none, those that publish nothing yet."""
+        if self._managed_nodes is None:
+            self._managed_nodes = graph.managed_nodes(self._node)
+        if publishers:
+            return tuple(each.node for each in publishers if each.node in self._managed_nodes)
+        return tuple(name for name, is_quiet in self._managed_nodes.items() if is_quiet)
 
     def _topics_alike(self, name: str, type_name: str | None) -> tuple[str, ...]:
         """Return topics that may have been meant; outputs of relays are none."""

@@ -14,6 +14,7 @@ FLOAT: Final = "std_msgs/msg/Float64"
 REFERENCE: Final = "sensor_msgs/msg/TimeReference"
 CLOCK: Final = "rosgraph_msgs/msg/Clock"
 ARRAY: Final = "diagnostic_msgs/msg/DiagnosticArray"
+EVENT: Final = "lifecycle_msgs/msg/TransitionEvent"
 TF: Final = "tf2_msgs/msg/TFMessage"
 
 

@@ -8,6 +8,7 @@ from tests.conformance.script import (
     BOOL,
     CLOCK,
     COLOR,
+    EVENT,
     FLOAT,
     IMAGE,
     MARKER,
@@ -303,6 +304,10 @@ _GRAPH: Final = (
         do.relay({**_front("/camera/imag", "/b"),
             "rear": group(row("/camera/image", output="/camera/imago"), "/b", manifest=False)}),
         do.endpoints("/camera/imago", publishers=1), do.finding("no_publisher")),
+    long("a managed node that publishes nothing yet, and sends nothing until it is active",
+        do.publisher("/driver/transition_event", of=EVENT, by="driver", node="driver"), do.publisher("/b"),
+        do.relay(PAIR), do.finding("no_publisher", naming="/driver publishes nothing yet"),
+        do.publisher("/a", by="driver", node="driver"), do.finding("silent", naming="ros2 lifecycle get /driver")),
 )
 
 _MESSAGES: Final = (

@@ -1,5 +1,7 @@
 """What the graph tells: facts that come to a finding, and the nearest that do not."""
 
+from dataclasses import replace
+
 from syncrelay.explain import BundleGraph, ClockState, Code, Endpoint, GraphSnapshot, Mismatch, Refusal
 from syncrelay.sync.counts import InputCounts
 from tests.explain.support.cases import AGES, HALF_A_SECOND, LIDAR, ONCE, QUIET, STRANGER, UNFIT, camera
@@ -62,6 +64,15 @@ FOUND = {
         camera(type=None, publishers=(), figures={"last_received": None}, alike=("/front/camera",)), LIDAR
     ),
     "nobody publishes": a_silent_group(camera(publishers=(), figures={"last_received": None}), LIDAR),
+    "nobody publishes, and a managed node publishes nothing": a_silent_group(
+        camera(publishers=(), figures={"last_received": None}, managed=("/usb_cam",)), LIDAR
+    ),
+    "several are not published, and managed nodes publish nothing": a_silent_group(
+        *(
+            replace(each, graph=replace(each.graph, managed=tuple(f"/driver{n}" for n in range(5))))
+            for each in unpublished(camera={}, lidar={})
+        )
+    ),
     "nobody publishes, but another name": a_silent_group(
         camera(publishers=(), figures={"last_received": None}, alike=("/cam",)), LIDAR
     ),
@@ -96,6 +107,10 @@ FOUND = {
     "nothing came ever": a_silent_group(
         camera(counts=InputCounts(0, 0, {}, 0), figures={**ONCE, "last_received": None}), LIDAR
     ),
+    "nothing came ever from a managed node": a_silent_group(
+        camera(counts=InputCounts(0, 0, {}, 0), figures={**ONCE, "last_received": None}, managed=("/usb_cam",)), LIDAR
+    ),
+    "nothing comes any more from a managed node": a_silent_group(camera(figures=QUIET, managed=("/usb_cam",)), LIDAR),
     "nothing came lately": a_silent_group(camera(figures={**ONCE, "last_received": None}), LIDAR),
     "nothing comes any more": a_silent_group(camera(figures=QUIET), LIDAR),
     "something was sent once that only latest_time holds": a_silent_group(camera(figures=ONCE), LIDAR),
