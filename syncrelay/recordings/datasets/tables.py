@@ -30,6 +30,7 @@ from syncrelay.recordings.datasets.images import IMAGE, NEEDED, ImageColumn, Ima
 from syncrelay.recordings.datasets.message_types import arrow_type
 from syncrelay.sync import Match, Message, Outcome
 
+_LARGEST: Final = 2**63 - 1
 _TIME: Final = pa.timestamp("ns", tz="UTC")
 METADATA: Final = b"syncrelay"
 """The key of a schema's metadata under which a JSON document says what the table is made of."""
@@ -103,7 +104,8 @@ class SetTable:
             "left_at": pa.array(left, _TIME),
             "span_ns": pa.array(map(self._span, stamps), pa.int64()),
             "latency_ns": pa.array(
-                [at - max(filter(None, some)) for at, some in zip(left, arrivals, strict=True)], pa.int64()
+                [at - max(each for each in some if each is not None) for at, some in zip(left, arrivals, strict=True)],
+                pa.int64(),
             ),
             "recording": pa.DictionaryArray.from_arrays(
                 pa.array([0] * len(matches), pa.int32()), pa.array([self._recording])
@@ -125,9 +127,11 @@ class SetTable:
                 lost = counted(column.undecodable, "message")
                 yield f"{column.topic}: {lost} could not be decoded as {column.type}, their cells are null"
 
-    def _span(self, stamps: Sequence[int | None]) -> int:
+    def _span(self, stamps: Sequence[int | None]) -> int | None:
+        """Return the span of a set; None where it takes more than 64 bits, as between equal keys and centuries."""
         matched = [stamp + offset for stamp, offset in zip(stamps, self._offsets, strict=True) if stamp is not None]
-        return max(matched) - min(matched)
+        span = max(matched) - min(matched)
+        return span if span <= _LARGEST else None
 
     def _described(self, table: pa.Table) -> pa.Schema:
         """Return the schema of this and all following tables, with metadata about the inputs."""
