@@ -77,11 +77,11 @@ def _lack(channel: Channel) -> str | None:
 
 
 def no_header(type_name: str, definition: Definition | None = None) -> str:
-    """Return why a type without a header is not matched, and by which of its fields it could be."""
+    """Return why a type that does not begin with a header is not matched, and by which of its fields it could be."""
     written = [f"`stamp: {{field: {name}}}`" for name in stamp_fields(type_name, definition)]
     if not written:
         return "its type has no header, so no stamp to match by"
-    return f"its type has no header; to match by a field of it, write {' or '.join(written)}"
+    return f"its type does not begin with a header; to match by a field of it, write {' or '.join(written)}"
 
 
 def _too_little(channel: Channel, figures: TopicFigures) -> str | None:

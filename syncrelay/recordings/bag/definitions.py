@@ -87,9 +87,10 @@ def begins_with_header(channel: Channel) -> bool | None:
 
 
 def stamp_fields(type_name: str, definition: Definition | None = None) -> tuple[str, ...]:
-    """Return the names of a type's own Time fields, for `stamp: {field: ...}`; none if the type is unknown."""
+    """Return where a type has times of its own and of its Headers, for `stamp: {field: ...}`; none if it is unknown."""
     _, fields = _store_of(type_name, definition).fielddefs.get(type_name, ([], []))
-    return tuple(name for name, description in fields if description == (Nodetype.NAME, _TIME))
+    paths = {_TIME: "{}", _HEADER: "{}.stamp"}
+    return tuple(paths[what].format(name) for name, (kind, what) in fields if kind == Nodetype.NAME and what in paths)
 
 
 def converter(channel: Channel) -> Convert:

@@ -9,7 +9,7 @@ from syncrelay.cdr_fields import field_reader, time_reader
 from syncrelay.cdr_walk import FieldsOf, UnreadableFieldError
 from syncrelay.config import GroupConfig, StampField, StampSource
 from syncrelay.errors import BagError
-from syncrelay.recordings.bag.definitions import begins_with_header, converter, fields_of
+from syncrelay.recordings.bag.definitions import begins_with_header, converter, fields_of, stamp_fields
 from syncrelay.recordings.bag.recording import LATEST, Channel, Encoding, RawMessage
 
 ReadStamp: TypeAlias = Callable[[bytes], int | None]
@@ -66,9 +66,10 @@ def stamp_reader(source: StampSource, channel: Channel) -> ReadStamp | None:
     if isinstance(source, StampField):
         return _in_place(channel, source.field, time_reader)
     if begins_with_header(channel) is False:
+        fields = "".join(f"`stamp: {{field: {path}}}`, or " for path in stamp_fields(channel.type, channel.definition))
         raise BagError(
             f"{channel.topic}: {channel.type} does not begin with a std_msgs/msg/Header, where the stamp is looked for:"
-            " write `stamp: receive` to go by arrival"
+            f" write {fields}`stamp: receive` to go by arrival"
         )
     return read_ros1_stamp if channel.encoding is Encoding.ROS1 else read_stamp
 

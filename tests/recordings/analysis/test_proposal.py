@@ -98,18 +98,27 @@ def test_every_topic_that_is_left_out_is_named_with_the_reason(tmp_path):
 @pytest.mark.parametrize(
     ("type_name", "definition", "said"),
     [
-        ("rcl_interfaces/msg/Log", None, "; to match by a field of it, write `stamp: {field: stamp}`"),
+        (
+            "rcl_interfaces/msg/Log",
+            None,
+            "does not begin with a header; to match by a field of it, write `stamp: {field: stamp}`",
+        ),
+        (
+            "robot/msg/Late",
+            Definition("ros2msg", "uint8 number\nstd_msgs/Header header"),
+            "does not begin with a header; to match by a field of it, write `stamp: {field: header.stamp}`",
+        ),
         (
             "robot/msg/Shot",
-            Definition("ros2msg", "builtin_interfaces/Time begin\nuint8 number\nbuiltin_interfaces/Time end"),
-            "; to match by a field of it, write `stamp: {field: begin}` or `stamp: {field: end}`",
+            Definition("ros2msg", "builtin_interfaces/Time a\nuint8 number\nbuiltin_interfaces/Time b"),
+            "does not begin with a header; to match by a field of it, write `stamp: {field: a}` or `stamp: {field: b}`",
         ),
-        (STRING, None, ", so no stamp to match by"),
-        ("robot/msg/Unknown", None, ", so no stamp to match by"),
+        (STRING, None, "has no header, so no stamp to match by"),
+        ("robot/msg/Unknown", None, "has no header, so no stamp to match by"),
     ],
 )
 def test_a_type_without_a_header_is_told_with_its_fields_of_time(type_name, definition, said):
-    assert no_header(type_name, definition) == f"its type has no header{said}"
+    assert no_header(type_name, definition) == f"its type {said}"
 
 
 def test_what_gives_no_set_with_the_others_is_named_too(tmp_path):

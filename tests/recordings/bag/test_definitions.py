@@ -144,7 +144,9 @@ def test_of_a_definition_in_any_format_the_same_is_known(fields, constants, line
         assert found("rig_msgs/Blip") == {name: _FORMS[form][0].format(_TYPES[kind][0]) for name, kind, form in named}
         assert found("rig_msgs/Other") == {}
         assert begins_with_header(channel) == (fields[0] == _LEADING)
-        assert stamp_fields(_TYPE, channel.definition) == tuple(name for name, *each in named if tuple(each) == _TIME)
+        paths = {_TIME: "{}", _LEADING: "{}.stamp"}
+        times = tuple(paths[kind, shape].format(name) for name, kind, shape in named if (kind, shape) in paths)
+        assert stamp_fields(_TYPE, channel.definition) == times
         definition, hashed = as_ros2(channel)
         assert definition is not None
         assert definition.format == (form if form != "ros1msg" else "ros2msg")
@@ -193,6 +195,13 @@ def test_annotations_comments_and_includes_of_idl_do_not_matter():
 @pytest.mark.parametrize("text", _USELESS_IDL.values(), ids=_USELESS_IDL)
 def test_an_idl_that_nests_without_end_leaves_the_type_unknown(text):
     assert begins_with_header(_channel(text, form="ros2idl")) is None
+
+
+def test_of_a_type_that_does_not_begin_with_its_header_the_field_to_write_is_named():
+    with pytest.raises(
+        BagError, match=r": write `stamp: \{field: header\.stamp\}`, or `stamp: receive` to go by arrival$"
+    ):
+        stamp_reader("header", _channel("uint8 number\nstd_msgs/Header header\n"))
 
 
 @pytest.mark.parametrize("field", ["number", "label", "header"])
