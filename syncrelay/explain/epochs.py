@@ -130,9 +130,11 @@ def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
 
     All are in nanoseconds, in the order of receipt.
     """
+    if len(stamps) < _SHOW_A_UNIT:
+        return None
     newest = _newest(stamps, delays)
     some = delays[newest]
-    if not some or max(some) - min(some) < _LEAST_SCATTER:
+    if max(some) - min(some) < _LEAST_SCATTER:
         # As nearly always, and seen without sorting.
         return None
     scatter = _scatter(some)
@@ -140,8 +142,6 @@ def reading(stamps: Sequence[int], delays: Sequence[int]) -> Reading | None:
     if scatter < _LEAST_SCATTER or scatter < 2 * _unit(stamps[-_ENOUGH:]):
         return None
     last = [(stamp, stamp + delay) for stamp, delay in zip(stamps[newest], delays[newest], strict=True)]
-    if len(last) < _SHOW_A_UNIT:
-        return None
     found, received = _of_rate(last, scatter), [at for _, at in last]
     span = received[-1] - received[0]
     # Of messages that were held up and come at once, stamps run fast too, but not over as long. Those that a latched
@@ -221,8 +221,6 @@ def _of_rate(last: Sequence[tuple[int, int]], scatter: int) -> Reading | None:
 def _newest(stamps: Sequence[int], delays: Sequence[int]) -> slice:
     """Return which of the newest messages are read."""
     count = len(stamps)
-    if not count:
-        return slice(0)
     begin = stamps[-1] + delays[-1] - _LATELY
     first = max(0, count - _FEWEST)
     step = max(1, count // _ENOUGH)
@@ -234,8 +232,6 @@ def _newest(stamps: Sequence[int], delays: Sequence[int]) -> slice:
 
 
 def _scatter(delays: Sequence[int]) -> int:
-    if not delays:
-        return 0
     ordered = sorted(delays)
     low, high = (ordered[round(share * (len(ordered) - 1))] for share in _MIDDLE)
     return high - low

@@ -129,7 +129,7 @@ class Judge:
         found += found_by(_OTHER_RULES, facts)
         if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
             found += [_unexplained(facts)] if facts.had_time and not rules_matching.is_too_soon(facts) else []
-        said = self._unexplained_by_others(found, facts) if found and self._causes else tuple(found)
+        said = self._unexplained_by_others(found, facts)
         # What is mended of the file or of stamps has cost sets that are missing from the share for a while.
         self._keep((each for each in said if each.code in MATCHING), facts)
         for each in said:

@@ -60,7 +60,7 @@ class Observation:
         self._left_at = no_values()
         self._resumed: int | None = None
         self._spans, self._latencies = no_values(), no_values()
-        self._need(config.enough([0] * len(config.topics)))
+        self._need(config.enough([each.fed for each in nothing]))
         self._nearest, self._nearest_at, self._nearest_since = no_values(), no_values(), no_values()
         self._measured_at = began
         self._changed_at = 0

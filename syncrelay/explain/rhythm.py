@@ -68,8 +68,8 @@ _MOSTLY: Final = 0.8
 _BY_CHANCE: Final = 1e-4
 # How near they are is known no better than this.
 _NEAR: Final = 0.01
-# Messages closer together than this came at once.
-_LEAST_PERIOD: Final = 1_000_000
+LEAST_PERIOD: Final = 1_000_000
+"""Messages closer together than this, in nanoseconds, came at once."""
 
 
 def steady_period(times: Sequence[int]) -> float | None:
@@ -83,14 +83,14 @@ def steady_period(times: Sequence[int]) -> float | None:
         return None
     usual = periods[len(periods) // 2]
     far = periods[round((1 - _HARDLY) * (len(periods) - 1))]
-    if usual < _LEAST_PERIOD or far > _FAR * usual:
+    if usual < LEAST_PERIOD or far > _FAR * usual:
         return None
     near = _about(usual, periods)
     if 2 * len(near) > len(periods) >= _LAST_PERIODS // 2:
         return sum(near) / len(near)
     # Where messages are lost at random, most periods are whole multiples of the shortest.
     short = periods[len(periods) // 4]
-    if short < _LEAST_PERIOD:
+    if short < LEAST_PERIOD:
         return None
     near = _about(short, periods)
     base = sum(near) / len(near)

@@ -16,6 +16,7 @@ from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Fault, Found, absence, counted, nodes, written
 from syncrelay.explain.other_stamps import by_offset_of_clock, by_other_stamps, wandering
+from syncrelay.explain.rhythm import LEAST_PERIOD
 from syncrelay.explain.rules_flow import fates
 from syncrelay.explain.rules_offset import constant_offset
 from syncrelay.explain.rules_stamps import other_clock
@@ -337,7 +338,7 @@ def _longest_pause(an_input: InputFacts, absent: int) -> int:
     if not figures.gaps:
         return 0
     # Where most come at once, any pause is longer than is usual.
-    usual = round(SECOND / figures.pace_hz) if figures.pace_hz else max(1, median_low(figures.gaps))
+    usual = round(SECOND / figures.pace_hz) if figures.pace_hz else max(LEAST_PERIOD, median_low(figures.gaps))
     pauses = [each for each in figures.gaps if each >= max(_PAUSE, _PAUSE_PERIODS * usual)]
     return max(pauses, default=0) if 2 * sum(each // usual for each in pauses) > absent else 0
 

@@ -5,6 +5,7 @@ from typing import Final
 
 from syncrelay.config import GroupConfig
 from syncrelay.explain.received import as_arrays
+from syncrelay.explain.rhythm import LEAST_PERIOD
 from syncrelay.explain.trials import UNTRIED, Trials, Verdict
 from syncrelay.explain.try_budget import OutOfTimeError, TryBudget
 from syncrelay.sync import Message
@@ -135,4 +136,4 @@ def _last(
 
 
 def _rate(pairs: Sequence[tuple[int, int]]) -> float:
-    return (len(pairs) - 1) / max(1, pairs[-1][1] - pairs[0][1]) if pairs else 0.0
+    return (len(pairs) - 1) / max(LEAST_PERIOD, pairs[-1][1] - pairs[0][1]) if pairs else 0.0
