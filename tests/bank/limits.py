@@ -24,7 +24,8 @@ from tests.bank.dials import Dial
 LIMITS: Final = Path(__file__).with_name("limits.txt")
 """A line a limit: what is drawn, by which seed, the number, the last before the limit, a digest of both sides."""
 
-_FIGURE: Final = re.compile(r"-?\d[\d.e-]* ?\w*")
+# Where there is none of what was counted, something else is said.
+_FIGURE: Final = re.compile(r"-?(?=[\d.]*[1-9])\d[\d.e-]* ?\w*")
 _DRAWN: Final[dict[str, Callable[[random.Random], Dial | None]]] = {
     "facts": dial_of_facts,
     "looks": dial_of_looks,
@@ -33,7 +34,7 @@ _DRAWN: Final[dict[str, Callable[[random.Random], Dial | None]]] = {
     "trials": dial_of_trials,
 }
 # From so many draws: minutes in all.
-_DRAWS: Final = {"facts": 45_000, "looks": 1_500, "input": 250, "rig": 40, "trials": 90}
+_DRAWS: Final = {"facts": 45_000, "looks": 1_500, "input": 400, "rig": 60, "trials": 200}
 # Of one condition so many are kept, and so many that are shown by one number.
 _OF_CONDITION: Final = 20
 _BY_NUMBER: Final = 3
