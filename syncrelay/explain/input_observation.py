@@ -136,23 +136,23 @@ class InputObservation:
 
     def _begin_anew(
         self, received: Sequence[int], delays: Sequence[int], least: int, most: int, *, has_fallen: bool
-    ) -> int:
+    ) -> int | None:
         """Look whether stamps jumped by what is no delay, and if so forget the clock that they were of.
 
-        Return the first of the new messages that are of the clock of now.
+        Return the first of the new messages that are of the clock of now, if not all are.
         """
         if not delays:
-            return 0
+            return None
         before = self._delays[-1] if self._delays else delays[0]
         # Stamps that do not run as time does may have come to do so.
         near = JUMP_NS if has_fallen or self._is_misread else _FAR_NS
         if max(before, most) - min(before, least) <= near:
             # As nearly always, and seen without looking at each.
-            return 0
+            return None
         by = _steps([*self._delays[-1:], *delays])
         # Of two clocks in turn, each fall is followed by a rise: nothing begins anew.
-        if max(map(abs, by), default=0) <= near or self._steps.swings(received[-1])[0]:
-            return 0
+        if max(map(abs, by)) <= near or self._steps.swings(received[-1])[0]:
+            return None
         # Of seconds that are milliseconds, each is far from the one before it.
         usual = median(map(abs, [*_steps(self._delays[-_PERIODS:]), *by]))
         far = [index for index, each in enumerate(by, len(delays) - len(by)) if abs(each) > max(near, _FAR * usual)]
@@ -167,7 +167,7 @@ class InputObservation:
             if self._is_misread:
                 self._steps.forget_levels()
                 self._pace.forget()
-        return far[-1] if far else 0
+        return far[-1] if far else None
 
     def _observe_pace(self, times: Sequence[int], fresh: int) -> None:
         before = self._pace.slowed_from
@@ -341,9 +341,9 @@ class InputObservation:
         times = self._received
         if len(times) < 2 or times[-1] <= times[0]:  # noqa: PLR2004  two make a period
             return 0.0, 0.0
-        # What a latched publisher had kept comes at once, and tells no rate.
+        # What a latched publisher had kept comes at once, and tells no rate. Some period is as long as the mean one.
         first, last = 0, len(times) - 1
-        while first < last - 1 and (times[first + 1] - times[first]) * last < _AT_ONCE * (times[last] - times[0]):
+        while (times[first + 1] - times[first]) * last < _AT_ONCE * (times[last] - times[0]):
             first += 1
         mean = (last - first) * _SECOND / (times[last] - times[first])
         usual = mean if len(times) >= _RATE_FROM else 0.0

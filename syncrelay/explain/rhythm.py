@@ -47,8 +47,9 @@ _SOON_PACES: Final = 12
 _STEADY: Final = 0.25
 # ... without counting one poll in this many at either end, in which a busy machine held messages up.
 _ODD: Final = 10
-# That it has is seen of so many periods if most are about as long, else of so many.
+# That it has is seen of so many periods if so many of them are about as long, else of so many.
 _LATEST: Final = 8
+_LATEST_ALIKE: Final = 7
 _LATEST_UNLIKE: Final = 12
 # So few may show that it does.
 _FEW: Final = 2
@@ -152,7 +153,7 @@ class PaceWatch:
         # A pace that falls is seen of the last few, if hardly any is as short as before: what is lost leaves some so.
         latest = periods[-_LATEST:]
         fell = self._fell_in(latest)
-        if fell and len(_about(median_low(latest), sorted(latest))) < _MOSTLY * _LATEST:
+        if fell and len(_about(median_low(latest), sorted(latest))) < _LATEST_ALIKE:
             fell = self._fell_in(periods[-_LATEST_UNLIKE:])
         if self.slowed_from is None and fell:
             self.slowed_from, self.now_hz = fell, _pace_hz(latest)

@@ -127,9 +127,8 @@ class Rows:
             return
         self._last.append(rows)
         self._in_last += len(rows)
-        if self._in_last >= BLOCK:
+        if whole := self._in_last - self._in_last % BLOCK:
             joined = np.concatenate(self._last)
-            whole = self._in_last - self._in_last % BLOCK
             for begin in range(0, whole, BLOCK):
                 self._keep(joined[begin : begin + BLOCK])
             self._in_last -= whole

@@ -40,8 +40,7 @@ def off_the_clock(facts: GroupFacts) -> Found:
     others = [each for each in off if each != index]
     mapped = offered_stamps(facts, Code.OTHER_CLOCK, index, *others)
     yield Fault(
-        f"stamps of {whose} are {words.span_of_time(abs(by))} {'behind' if by > 0 else 'ahead of'}"
-        f" {facts.clock_name}, which triggers the sets",
+        f"stamps of {whose} are {words.behind(by)} {facts.clock_name}, which triggers the sets",
         _to_one_clock(facts) + mapped,
         Severity.ERROR,
         input=None if are_all else index,

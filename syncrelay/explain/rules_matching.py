@@ -249,9 +249,8 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
     about, behind = (Code.WAITING_FOR_OPTIONAL, index), _behind(facts, an_input)
     if tolerance is not None and abs(behind) > max(SECOND, tolerance.ns):
         found = _verdict(facts, about, lambda trials: _in_time(index, trials))
-        side = "behind" if behind > 0 else "ahead of"
         return (
-            f": its stamps are {words.span_of_time(abs(behind))} {side} those of the others",
+            f": its stamps are {words.behind(behind)} those of the others",
             f"synchronize their clocks{_or(_advice(facts, found, name))}",
         )
     if tolerance is None or len(nearest) < _FEWEST:

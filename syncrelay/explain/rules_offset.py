@@ -44,8 +44,8 @@ def constant_offset(facts: GroupFacts) -> Found:
         name = facts.inputs[odd].name
         advice = offered_offset(facts, Code.CONSTANT_OFFSET, odd, facts.inputs[odd].offset - off)
         yield Fault(
-            f"stamps of {name} are always {words.duration(abs(off))} {'ahead of' if off > 0 else 'behind'} those of"
-            f" {facts.inputs[right].name} received at the same time: sets may hold messages of different moments",
+            f"stamps of {name} are always {words.behind(-off)} those of {facts.inputs[right].name} received at the"
+            " same time: sets may hold messages of different moments",
             f"check how {nodes(facts.inputs[odd])} stamps"
             + (f"; if both are measured at the same time, {advice}" if advice else ""),
             input=odd,

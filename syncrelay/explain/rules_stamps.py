@@ -124,8 +124,8 @@ def other_clock(facts: GroupFacts) -> Found:
         newest = an_input.figures.stamps[-1] if an_input.figures.stamps else 0
         scale = time_scale(newest, behind)
         text = (
-            f"stamps of {an_input.name}{shifted} are {words.span_of_time(abs(behind))}"
-            f" {'behind' if behind > 0 else 'ahead of'} those of {whose}{f': they {scale.what}' if scale else ''}"
+            f"stamps of {an_input.name}{shifted} are {words.behind(behind)} those of {whose}"
+            f"{f': they {scale.what}' if scale else ''}"
         )
         text += "" if facts.has_stopped else ": sets hold messages of different moments"
         by = behind if scale is None else scale.behind

@@ -136,8 +136,8 @@ class ShareWindow:
         self._is_pausing: list[bool] = []
         self._is_steady: list[bool] = []
         self._paced: set[int] = set()
-        self._has_clock = False
-        self._have_all_come = False
+        # None until all have come.
+        self._had_clock: bool | None = None
         self._share: Share | None = None
 
     def clear(self) -> None:
@@ -150,9 +150,9 @@ class ShareWindow:
         self, counts: Sequence[InputCounts], sets: int, paces: Sequence[Pace], *, now: int, clock: int | None = None
     ) -> None:
         """Take the counts as they are now; `clock` is the time by which sets are made, where it is not `now`."""
-        had_clock, self._has_clock = self._has_clock, clock is not None
-        had_all_come, self._have_all_come = self._have_all_come, self._have_come(paces)
-        if had_clock is not self._has_clock or not had_all_come:
+        had_clock, has_clock = self._had_clock, clock is not None
+        self._had_clock = has_clock if self._have_come(paces) else None
+        if had_clock is not has_clock:
             # Nothing is known to lie between the times of two clocks. What came before the last input did makes no set.
             self._polls.clear()
         elif self._ticks_hz is not None and self._polls and not self._polls[-1].sets:

@@ -35,6 +35,11 @@ def span_of_time(nanoseconds: float) -> str:
     return duration(nanoseconds) if nanoseconds < 100_000_000_000 else seconds(nanoseconds)  # noqa: PLR2004
 
 
+def behind(nanoseconds: int) -> str:
+    """Return how far stamps are behind others; ahead of them, where it is less than 0."""
+    return f"{span_of_time(abs(nanoseconds))} {'behind' if nanoseconds > 0 else 'ahead of'}"
+
+
 def rate(hertz: float) -> str:
     """Return a rate with its unit, such as 19.9 Hz."""
     return f"{figure(hertz)} Hz"
