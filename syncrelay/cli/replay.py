@@ -13,7 +13,7 @@ from syncrelay.urls import redacted
 
 if TYPE_CHECKING:
     from syncrelay.recordings.bag.bindings import GroupBinding
-    from syncrelay.recordings.bag.replay import Listener
+    from syncrelay.recordings.bag.replay import Left, Listener
     from syncrelay.recordings.bag.writing import SetWriter
     from syncrelay.rig.what_if import Fault
     from syncrelay.sync import Outcome
@@ -123,27 +123,28 @@ def _remark_all(sentences: Iterable[str]) -> None:
 
 
 def _printing(arguments: Namespace, bindings: "Sequence[GroupBinding]") -> "Iterator[Listener]":
+    """Yield what prints sets and drops, if any are to be printed."""
     from syncrelay.explain import GroupLines, RecentDrop
     from syncrelay.recordings.bag.replay import received
     from syncrelay.sync import Match
 
     lines = {each.group.name: GroupLines(each.group, [one.topic for one in each.inputs]) for each in bindings}
 
-    def print_set(binding: "GroupBinding", outcome: "Outcome", now: int) -> None:
+    def line(name: str, outcome: "Outcome", now: int) -> str | None:
         if isinstance(outcome, Match):
             last = max(received(message) for message in outcome.messages if message is not None)
-            put(lines[binding.group.name].of_set(outcome.stamps, left=now, received=last))
+            return lines[name].of_set(outcome.stamps, left=now, received=last) if arguments.json else None
+        drop = RecentDrop(outcome.message.input, outcome.message.stamp, outcome.reason)
+        return lines[name].of_drop(drop, left=now, received=received(outcome.message)) if arguments.drops else None
 
-    def print_drop(binding: "GroupBinding", outcome: "Outcome", now: int) -> None:
-        if not isinstance(outcome, Match):
-            message = outcome.message
-            drop = RecentDrop(message.input, message.stamp, outcome.reason)
-            put(lines[binding.group.name].of_drop(drop, left=now, received=received(message)))
+    def show(left: "Sequence[Left]") -> None:
+        for binding, outcomes, now in left:
+            for outcome in outcomes:
+                if (shown := line(binding.group.name, outcome, now)) is not None:
+                    put(shown)
 
-    if arguments.json:
-        yield print_set
-    if arguments.drops:
-        yield print_drop
+    if arguments.json or arguments.drops:
+        yield show
 
 
 def _written(arguments: Namespace, bindings: "Sequence[GroupBinding]", opened: ExitStack) -> "SetWriter | None":

@@ -4,6 +4,8 @@ docs/reference/manifest.md is its contract. Whatever is the same in every set of
 """
 
 from collections.abc import Mapping, Sequence
+from itertools import accumulate, chain
+from operator import add
 from struct import Struct
 from typing import Final, NamedTuple
 
@@ -31,21 +33,20 @@ _LONGEST: Final = 200
 
 
 class Note(NamedTuple):
-    """What the manifest of a set tells; of `stamps` and what follows, one for each input. Times in nanoseconds.
+    """What the manifest of a set tells. Times in nanoseconds.
 
-    `common` is the stamp that the set was given, if any. The stamp of a missing input is None. A message is the
-    `sent`-th of its output, from 1; that of one that could not be published is 0, and `unpublished` says why, by its
-    input. Of a group with a bundle, the set left as the `bundle`-th of these; 0 if that could not be published, of
-    which `unpublished` says why behind all inputs where these have outputs of their own.
+    `common` is the stamp that the set was given, if any. `missing` are the inputs of which it has no message. Each
+    other input has four `values`: the stamp with which its message left, the one with which it came, when it was
+    received, and which one of its output it is, from 1. The last is 0 if it could not be published; `unpublished` then
+    says why, by its input. Of a group with a bundle, the set left as the `bundle`-th of these; 0 if that could not be
+    published, of which `unpublished` says why behind all inputs where these have outputs of their own.
     """
 
     number: int
     latency: int
     common: int | None
-    stamps: Sequence[int | None]
-    left_as: Sequence[int | None]
-    received: Sequence[int | None]
-    sent: Sequence[int]
+    values: Sequence[int]
+    missing: tuple[int, ...]
     unpublished: Mapping[int, str]
     bundle: int = 0
 
@@ -75,40 +76,50 @@ class ManifestWriter:
         self._offsets = tuple(topic.offset_ns for topic in config.topics)
         self._names = [(_text(output), _text(source)) for source, output in topics]
         self._bundle = None if bundle is None else _text(bundle)
-        self._templates: dict[tuple[object, ...], bytes] = {}
+        self._templates: dict[tuple[object, ...], tuple[bytes, int]] = {}
 
-    def write(self, note: Note) -> bytes:
-        """Return the manifest of a set."""
-        stamps, common, unpublished = note.stamps, note.common, note.unpublished
-        # With the offsets, as the span of `/status` and of `analyze`.
-        matched = [stamp + offset for stamp, offset in zip(stamps, self._offsets, strict=True) if stamp is not None]
-        header = max([stamp for stamp in stamps if stamp is not None]) if common is None else common
-        numbers = [note.number, len(stamps) - len(matched), max(matched) - min(matched), note.latency]
-        if common is not None:
-            numbers.append(common)
-        if self._bundle is not None:
-            numbers.append(note.bundle)
-        rows = zip(note.left_as, stamps, note.received, note.sent, strict=True)
-        values = [value for row in rows if row[1] is not None for value in row]
-        kinds = tuple([None if stamp is None else unpublished.get(index, "") for index, stamp in enumerate(stamps)])
-        # At once: one by one takes half as long again.
-        written = b"%d " * (len(numbers) + len(values)) % (*numbers, *values)
-        digits, unbundled = written.split(), unpublished.get(len(stamps))
-        key = (common is None, kinds, unbundled, written.translate(_ANY_DIGITS))
-        template = self._templates.get(key) or self._template(key, digits, kinds, unbundled)
-        return template % (_BEGIN(0, 1, 0, 0, *divmod(header, _NS_PER_SECOND)), *digits)
+    def write(self, notes: Sequence[Note]) -> Sequence[bytes]:
+        """Return the manifests of sets."""
+        begins: list[bytes] = []
+        rows: list[list[int]] = []
+        for note in notes:
+            stamps, common, missing = note.values[1::4], note.common, note.missing
+            matched = stamps
+            if any(self._offsets):
+                # The span of `/status` and of `analyze` counts them, too.
+                offsets = [each for index, each in enumerate(self._offsets) if index not in missing]
+                matched = list(map(add, stamps, offsets))
+            header = max(stamps) if common is None else common
+            begins.append(_BEGIN(0, 1, 0, 0, *divmod(header, _NS_PER_SECOND)))
+            row = [note.number, len(missing), max(matched) - min(matched), note.latency]
+            if common is not None:
+                row.append(common)
+            if self._bundle is not None:
+                row.append(note.bundle)
+            row += note.values
+            rows.append(row)
+        # All numbers at once, here and below: one by one takes twice as long.
+        numbers = tuple(chain.from_iterable(rows))
+        written = b"".join([b"%d " * len(row) + b"\n" for row in rows]) % numbers
+        templates = [
+            self._templates.get((note.missing, *note.unpublished.items(), shape)) or self._template(note, shape)
+            for note, shape in zip(notes, written.translate(_ANY_DIGITS).splitlines(), strict=True)
+        ]
+        whole = b"".join([template for template, _ in templates]) % numbers
+        ends = accumulate([size for _, size in templates])
+        return [begin + whole[end - size : end] for begin, end, (_, size) in zip(begins, ends, templates, strict=True)]
 
-    def _template(
-        self, key: tuple[object, ...], digits: Sequence[bytes], kinds: Sequence[str | None], unbundled: str | None
-    ) -> bytes:
-        """Return what the stamp and these digits, or others of their lengths, are filled into, and keep it."""
+    def _template(self, note: Note, shape: bytes) -> tuple[bytes, int]:
+        """Return what numbers of so many digits are filled into, without the stamp, and its size then; keep it."""
+        digits = shape.split()
         sizes = iter([len(each) for each in digits])
-        has_no_common = key[0]
+        inputs, unpublished = range(len(self._names)), note.unpublished
+        kinds = [None if index in note.missing else unpublished.get(index, "") for index in inputs]
         # None is the place of digits.
-        parts: list[bytes | None] = [None, self._head(kinds.count(None), sum(map(bool, kinds)), unbundled)]
+        parts: list[bytes | None] = [self._head(len(note.missing), sum(map(bool, kinds)), unpublished.get(len(inputs)))]
         for name in ("set", "missing", "span_ns", "latency_ns"):
             parts += (_key(name), *_number(next(sizes)))
-        parts += (_key("common_stamp_ns"), *((_text(""),) if has_no_common else _number(next(sizes))))
+        parts += (_key("common_stamp_ns"), *((_text(""),) if note.common is None else _number(next(sizes))))
         if self._bundle is not None:
             parts += (_key("bundle"), self._bundle, _key("bundle_sequence"), *_number(next(sizes)))
         parts += (_key("policy"), self._policy)
@@ -123,10 +134,11 @@ class ManifestWriter:
                 parts += (_key("sequence"), _COUNT(last), None, b"\0")
                 at = last % 4
         # A size may be that of a percent sign.
-        template = b"".join([b"%b" if part is None else part.replace(b"%", b"%%") for part in parts])
+        content = b"".join([b"%d" if part is None else part.replace(b"%", b"%%") for part in parts])
+        template = content, sum([len(part) for part in parts if part is not None]) + sum(map(len, digits))
         if len(self._templates) >= _MOST_TEMPLATES:
             self._templates.clear()
-        self._templates[key] = template
+        self._templates[note.missing, *unpublished.items(), shape] = template
         return template
 
     def _head(self, missing: int, unpublished: int, unbundled: str | None) -> bytes:

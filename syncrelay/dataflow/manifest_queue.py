@@ -27,31 +27,29 @@ MOST_NOTED: Final = 10_000
 
 def _noted(flow: Flow, match: Match, latency: int, writer: ManifestWriter) -> Note:
     """Note what the manifest of the set that was just sent tells. Its payloads are not kept: they may be large."""
-    common, stamps, is_by_header = match.stamp, match.stamps, writer.is_by_header
-    left_as = stamps
-    if common is not None:
-        pairs = zip(stamps, flow.restamped, strict=True)
-        left_as = tuple([common if restamped and stamp is not None else stamp for stamp, restamped in pairs])
-    elif not all(is_by_header):
-        # What was matched by another time leaves with the header that it came with.
-        rows = zip(match.messages, stamps, flow.restamped, is_by_header, strict=True)
-        left_as = tuple(
-            [
-                stamp if message is None or is_matched or not has_header else header_stamp(message.payload.content())
-                for message, stamp, has_header, is_matched in rows
-            ]
-        )
-    received = [None if message is None else message.payload.received for message in match.messages]
+    messages, common = match.messages, match.stamp
     unpublished = {index: each.why for index, each in flow.unpublished.items()}
-    bundle = 0 if flow.bundle is None or len(stamps) in unpublished else flow.bundle.sent
+    bundle = 0 if flow.bundle is None or len(messages) in unpublished else flow.bundle.sent
     if writer.has_bundles_alone:
-        sent = [bundle] * len(stamps)
-        unpublished = dict.fromkeys(range(len(stamps)), *unpublished.values()) if unpublished else {}
+        sent = [bundle] * len(messages)
+        unpublished = dict.fromkeys(range(len(messages)), *unpublished.values()) if unpublished else {}
     else:
         sent = [0 if outlet is None else outlet.sent for outlet in flow.outlets]
-    if unpublished:
-        sent = [0 if index in unpublished else count for index, count in enumerate(sent)]
-    return Note(flow.n_sets, latency, common, stamps, left_as, received, sent, unpublished, bundle)
+    values: list[int] = []
+    missing: list[int] = []
+    rows = zip(messages, flow.restamped, writer.is_by_header, sent, strict=True)
+    for index, (message, has_header, is_matched, count) in enumerate(rows):
+        if message is None:
+            missing.append(index)
+            continue
+        stamp = left_as = message.stamp
+        if has_header and common is not None:
+            left_as = common
+        elif has_header and not is_matched:
+            # What was matched by another time leaves with the header that it came with.
+            left_as = header_stamp(message.payload.content())
+        values += left_as, stamp, message.payload.received, 0 if index in unpublished else count
+    return Note(flow.n_sets, latency, common, values, tuple(missing), unpublished, bundle)
 
 
 class GroupManifests:
@@ -78,7 +76,7 @@ class GroupManifests:
 
     def publish(self, note: Note) -> None:
         """Publish a manifest; say it once where DDS refuses."""
-        content = self._writer.write(note)
+        (content,) = self._writer.write([note])
         try:
             self._outlet.send_content(content)
         except PublishError as error:

@@ -31,7 +31,10 @@ def test_others_read_what_was_written(data, name, node, number, latency):
     given = note(number, members, common=common, latency=latency)._replace(bundle=number - 1)
     if unbundled is not None:
         given = given._replace(unpublished={**given.unpublished, len(members): unbundled})
-    payload = writer.write(given)
+    # Each as if it were alone.
+    other = note(number, members[::-1], common=common, latency=number)
+    payload, _ = manifests = writer.write([given, other])
+    assert [*writer.write([given]), *writer.write([other])] == manifests
 
     told = read(payload)
     stamps = [each.original_stamp for each in members if each is not None]
@@ -75,4 +78,4 @@ def test_a_long_reason_is_told_in_part():
     group = group_of(topics=["/a", "/b"])
     writer = ManifestWriter(group.config, node="/n", topics=[("/a", "/x"), ("/b", "/y")], bundle=None)
     members = [Member(1, 1, 1, 0, "no room\0, " * 100), Member(1, 1, 1, 1)]
-    assert 0 < len(read(writer.write(note(1, members))).inputs[0].message) <= 200
+    assert 0 < len(read(*writer.write([note(1, members)])).inputs[0].message) <= 200

@@ -22,14 +22,13 @@ class Member(NamedTuple):
 
 def note(number: int, members: Sequence[Member | None], *, common: int | None = None, latency: int = 0) -> Note:
     """Give what the manifest of a set is written from."""
+    there = [each for each in members if each is not None]
     return Note(
         number=number,
         latency=latency,
         common=common,
-        stamps=[each and each.original_stamp for each in members],
-        left_as=[each and each.stamp for each in members],
-        received=[each and each.received for each in members],
-        sent=[each.sequence if each is not None else 0 for each in members],
+        values=[value for each in there for value in (each.stamp, each.original_stamp, each.received, each.sequence)],
+        missing=tuple(index for index, each in enumerate(members) if each is None),
         unpublished={index: each.why_not for index, each in enumerate(members) if each is not None and each.why_not},
     )
 

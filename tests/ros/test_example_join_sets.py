@@ -49,7 +49,7 @@ class _Run:
             members.append(None if stamp is None else Member(stamp, stamp, stamp, sequence))
             if stamp is not None:
                 self.published[topic].append((joined[topic], {"publication_sequence_number": sequence}))
-        payload = _WRITER.write(note(number, members))
+        (payload,) = _WRITER.write([note(number, members)])
         self.published[""].append((serialization.deserialize_message(payload, DiagnosticArray),))
         self.sets.append(joined)
 

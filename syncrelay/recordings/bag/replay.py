@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, TypeAlias
 
 from syncrelay.explain import UNREADABLE, EngineDriver
@@ -11,8 +12,14 @@ from syncrelay.recordings.bag.recording import Channel, RawMessage, Recording
 from syncrelay.recordings.bag.transforms import TransformReader, frame_reader, transform_channels
 from syncrelay.sync import InputCounts, Message, Outcome
 
-Listener: TypeAlias = Callable[[GroupBinding, Outcome, int], None]
-"""Called with each set and drop of a group and the time at which it leaves. A message's payload is its RawMessage."""
+Left: TypeAlias = tuple[GroupBinding, Sequence[Outcome], int]
+"""Sets and drops of a group, and the time at which they left. A message's payload is its RawMessage."""
+
+Listener: TypeAlias = Callable[[Sequence[Left]], None]
+"""Called with what left while a batch was read: one by one, they and the engine would empty each other's caches."""
+
+# A clock may trigger any number of sets between two messages.
+_MOST_LEFT: Final = 5_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,10 +42,9 @@ class GroupResult:
 class GroupReplay:
     """One group at work on a recording."""
 
-    def __init__(self, binding: GroupBinding, listeners: Sequence[Listener]) -> None:
+    def __init__(self, binding: GroupBinding, take: Callable[[Sequence[Outcome], int], None] | None) -> None:
         self.binding = binding
-        self.driver: Final = EngineDriver(binding.group, self._take if listeners else None, ())
-        self._listeners = listeners
+        self.driver: Final = EngineDriver(binding.group, take, ())
 
     def readers(self) -> Iterator[list[tuple[Channel, ReadColumn]]]:
         """Yield the readers of each input's channels; raises BagError for a stamp or key that a type does not have."""
@@ -52,11 +58,6 @@ class GroupReplay:
         inputs = tuple(InputResult(*each) for each in zip(topics, engine.counts(), strict=True))
         return GroupResult(self.binding.group.name, inputs, engine.sets)
 
-    def _take(self, outcomes: Sequence[Outcome], now: int) -> None:
-        for outcome in outcomes:
-            for listener in self._listeners:
-                listener(self.binding, outcome, now)
-
 
 class Replay:
     """Groups at work on a recording, a step for each batch that is read of it."""
@@ -66,7 +67,9 @@ class Replay:
     ) -> None:
         """Raises BagError for a stamp or key that a recorded type does not have."""
         self._recording = recording
-        self._groups = [GroupReplay(binding, listeners) for binding in bindings]
+        self._listeners = listeners
+        self._left: list[Left] = []
+        self._groups = [GroupReplay(each, partial(self._take, each) if listeners else None) for each in bindings]
         awaiting = [each for each in self._groups if each.binding.group.options.transforms is not None]
         self._awaiting = [group.driver for group in awaiting]
         channels = transform_channels(recording) if awaiting else []
@@ -91,10 +94,12 @@ class Replay:
         """Feed the recording to its end, a batch a step."""
         for rows in self._recording.batches(self._columns.channels):
             self._feed(rows)
+            self._tell()
             yield
         for group in self._groups:
             # The end of a damaged recording may be wrong.
             group.driver.finish(max(self._now, self._recording.end))
+        self._tell()
 
     def _feed(self, rows: Sequence[RawMessage]) -> None:
         for place, raw, stamp, key in self._columns.in_order(Batch(rows)):
@@ -110,6 +115,16 @@ class Replay:
             else:
                 frame = None if read_frame is None else read_frame(raw)
                 driver.add(Message(index, stamp, raw, key, frame), now=now)
+
+    def _take(self, binding: GroupBinding, outcomes: Sequence[Outcome], now: int) -> None:
+        self._left.append((binding, outcomes, now))
+        if len(self._left) >= _MOST_LEFT:
+            self._tell()
+
+    def _tell(self) -> None:
+        left, self._left = self._left, []
+        for listener in self._listeners:
+            listener(left)
 
     def _learn(self, raw: RawMessage) -> None:
         edges = self._transforms.read(raw)

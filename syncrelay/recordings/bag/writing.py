@@ -1,11 +1,14 @@
 """Writes the sets of a replay as a recording of what the relay would have published."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import count, repeat
+from typing import Final, NamedTuple
 
 from syncrelay.cdr import patch_stamp
 from syncrelay.cdr_assembly import UnfitError
+from syncrelay.config import GroupConfig
 from syncrelay.config.names_in_graph import MANIFEST_TYPE, manifest_topic
 from syncrelay.config.profile import Profile, matched
 from syncrelay.config.resolved import BundleConfig
@@ -17,7 +20,11 @@ from syncrelay.recordings.bag.bundles import recorded_bundle
 from syncrelay.recordings.bag.definitions import as_ros2, begins_with_header, converter, jazzy_definition
 from syncrelay.recordings.bag.mcap_output import McapOutput, Output
 from syncrelay.recordings.bag.recording import Channel, Encoding
-from syncrelay.sync import Match, Outcome
+from syncrelay.recordings.bag.replay import Left
+from syncrelay.sync import Match
+
+# How many bytes of messages wait, without manifests: restamped ones are copies.
+_MOST_WAITING: Final = 1_000_000
 
 
 class Outgoing(NamedTuple):
@@ -34,21 +41,42 @@ class _Bundles(NamedTuple):
     output: Output
 
 
-class _Manifest(NamedTuple):
-    """The writer of a group's manifests, and their topic in the recording."""
+class _Manifests(NamedTuple):
+    """What writes the manifests of a group, and their topic in the recording."""
 
     writer: ManifestWriter
     output: Output
 
 
+class _Member(NamedTuple):
+    """How the messages of a channel leave in the sets of an input.
+
+    `is_as_matched` says that they leave with the stamp by which they were matched.
+    """
+
+    written: Callable[[bytes, int | None], bytes]
+    is_as_matched: bool
+
+
+class _Source(NamedTuple):
+    """An input of a group: how the messages of its channels leave, and which one of its output the next one is."""
+
+    members: dict[Channel, _Member]
+    sent: Iterator[int]
+
+
 @dataclass(slots=True)
 class _Leaving:
-    """How the sets of a group leave: for each input, by the channel, what its payloads become, and its topic if any."""
+    """How the sets of a group leave."""
 
-    payloads: list[dict[Channel, Outgoing]]
-    outputs: list[Output | None]
-    bundles: _Bundles | None = None
-    manifest: _Manifest | None = None
+    sources: list[_Source]
+    channels: list[int]
+    """The output of each input; empty if sets leave as bundles alone."""
+    bundles: _Bundles | None
+    manifests: _Manifests | None
+    numbers: Iterator[int] = field(default_factory=partial(count, 1))
+    noted: list[tuple[int, Note]] = field(default_factory=list)
+    """Manifests that are to be written, and their places among the messages that are."""
 
 
 class SetWriter:
@@ -65,87 +93,101 @@ class SetWriter:
         """A sentence for each group whose bundles are not written, because their type is not installed here."""
         self.messages = 0
         """How many messages were written, without manifests."""
+        # The messages that wait to be written, and the size of those of inputs and of bundles.
+        self._channels: list[int] = []
+        self._payloads: list[bytes] = []
+        self._times: list[int] = []
+        self._size = 0
 
     def begin(self, binding: GroupBinding) -> None:
         """Add the output topics of a group; those without a message are recorded too.
 
         Raises BagError where the type of its bundles is installed and cannot hold what was recorded.
         """
-        has_outputs = binding.group.options.outputs
-        leaving = _Leaving(
-            [{channel: outgoing(each, channel) for channel in each.channels} for each in binding.inputs],
-            [self._output(each) if each.channels and has_outputs else None for each in binding.inputs],
+        group = binding.group
+        channels = [self._output(each) if each.channels else 0 for each in binding.inputs if group.options.outputs]
+        self._leaving[group.name] = _Leaving(
+            [_Source(_members(group, each), count(1) if channels else repeat(0)) for each in binding.inputs],
+            channels,
+            self._add_bundles(binding, group.bundle) if group.bundle is not None and binding.is_complete else None,
+            self._manifests(binding) if group.options.manifest else None,
         )
-        if binding.group.bundle is not None and binding.is_complete:
-            leaving.bundles = self._add_bundles(binding, binding.group.bundle)
-        if binding.group.options.manifest:
-            leaving.manifest = self._manifest(binding)
-        self._leaving[binding.group.name] = leaving
 
-    def take(self, binding: GroupBinding, outcome: Outcome, now: int) -> None:
-        """Write a set that leaves at `now`; drops are ignored."""
-        if not isinstance(outcome, Match):
-            return
-        leaving, common = self._leaving[binding.group.name], outcome.stamp
+    def take(self, left: Sequence[Left]) -> None:
+        """Write the sets of what left."""
+        for binding, outcomes, now in left:
+            for outcome in outcomes:
+                if isinstance(outcome, Match):
+                    self._add(self._leaving[binding.group.name], outcome, now)
+        self._write()
+
+    def _add(self, leaving: _Leaving, match: Match, now: int) -> None:
+        common, number, bundle = match.stamp, next(leaving.numbers), 0
         contents: list[bytes | None] = []
-        left_as: list[int | None] = []
-        received: list[int | None] = []
-        for index, message in enumerate(outcome.messages):
+        values: list[int] = []
+        for message, (members, sent) in zip(match.messages, leaving.sources, strict=True):
             if message is None:
                 contents.append(None)
-                left_as.append(None)
-                received.append(None)
                 continue
-            channel, at, payload = message.payload
-            written, has_header = leaving.payloads[index][channel]
-            content = written(payload, common)
-            is_as_matched = not has_header or (common is None and binding.inputs[index].config.is_by_header)
+            channel, received, payload = message.payload
+            written, is_as_matched = members[channel]
+            content, stamp = written(payload, common), message.stamp
             contents.append(content)
-            left_as.append(message.stamp if is_as_matched else header_stamp(content))
-            received.append(at)
-        sent = self._publish(binding, outcome, contents, now)
-        if leaving.manifest is not None:
-            writer, output = leaving.manifest
-            latency = now - max([each for each in received if each is not None])
-            bundle = 0 if leaving.bundles is None else leaving.bundles.output.count
-            note = Note(output.count + 1, latency, common, outcome.stamps, left_as, received, sent, {}, bundle)
-            self._recording.write(output, writer.write(note), now)
+            values += stamp if is_as_matched else header_stamp(content), stamp, received, next(sent)
+        channels, payloads = self._channels, self._payloads
+        if leaving.bundles is not None:
+            bundle = number
+            channels.append(leaving.bundles.output.channel)
+            payloads.append(self._bundled(leaving.bundles, match, contents, number))
+        if leaving.channels:
+            there = [content for content in contents if content is not None]
+            payloads += there
+            self._size += sum(map(len, there))
+            rows = zip(leaving.channels, contents, strict=True)
+            channels += [channel for channel, content in rows if content is not None]
+        elif bundle:
+            self._size += len(payloads[-1])
+            values[3::4] = [number] * (len(values) // 4)
+        if leaving.manifests is not None:
+            missing = tuple([index for index, content in enumerate(contents) if content is None])
+            note = Note(number, now - max(values[2::4]), common, values, missing, {}, bundle)
+            leaving.noted.append((len(payloads), note))
+            channels.append(leaving.manifests.output.channel)
+            payloads.append(b"")
+        self._times += [now] * (len(payloads) - len(self._times))
+        if self._size >= _MOST_WAITING:
+            self._write()
 
-    def _publish(
-        self, binding: GroupBinding, match: Match, contents: Sequence[bytes | None], now: int
-    ) -> Sequence[int]:
-        """Write the messages of a set; return the number of each among those of its topic, 0 of one that is missing."""
-        leaving = self._leaving[binding.group.name]
-        if (bundles := leaving.bundles) is not None:
-            try:
-                whole = bundles.bundle.content(contents, match.stamps, match.stamp, bundles.output.count + 1)
-            except UnfitError as error:
-                raise BagError(f"{bundles.output.topic}: {error}") from error
-            self._write(bundles.output, whole, now)
-            if not binding.group.options.outputs:
-                return [0 if each is None else bundles.output.count for each in contents]
-        sent = [0] * len(contents)
-        for index, (content, output) in enumerate(zip(contents, leaving.outputs, strict=True)):
-            if content is not None and output is not None:
-                self._write(output, content, now)
-                sent[index] = output.count
-        return sent
+    def _write(self) -> None:
+        """Write what waits. Manifests are made at once: one by one they take twice as long."""
+        for leaving in self._leaving.values():
+            if leaving.manifests is not None:
+                contents = leaving.manifests.writer.write([note for _, note in leaving.noted])
+                for (place, _), content in zip(leaving.noted, contents, strict=True):
+                    self._payloads[place] = content
+                self.messages -= len(contents)
+                leaving.noted.clear()
+        self._recording.write_all(self._channels, self._payloads, self._times)
+        self.messages += len(self._payloads)
+        self._channels, self._payloads, self._times, self._size = [], [], [], 0
 
-    def _write(self, output: Output, content: bytes, now: int) -> None:
-        self._recording.write(output, content, now)
-        self.messages += 1
+    def _bundled(self, bundles: _Bundles, match: Match, contents: Sequence[bytes | None], number: int) -> bytes:
+        try:
+            return bundles.bundle.content(contents, match.stamps, match.stamp, number)
+        except UnfitError as error:
+            raise BagError(f"{bundles.output.topic}: {error}") from error
 
-    def _manifest(self, binding: GroupBinding) -> "_Manifest":
+    def _manifests(self, binding: GroupBinding) -> _Manifests:
         node = binding.group.inputs.node
         topics = [(each.topic, each.output) for each in binding.inputs]
         bundle = None if binding.group.bundle is None else node.absolute(binding.group.bundle.topic)
         writer = ManifestWriter(binding.group, node=node.absolute("~"), topics=topics, bundle=bundle)
         topic, profile = node.absolute(manifest_topic(binding.group.name)), Profile(depth=MANIFEST_DEPTH)
-        return _Manifest(writer, self._recording.add(topic, MANIFEST_TYPE, *jazzy_definition(MANIFEST_TYPE), profile))
+        return _Manifests(writer, self._recording.add(topic, MANIFEST_TYPE, *jazzy_definition(MANIFEST_TYPE), profile))
 
-    def _output(self, each: Input) -> Output:
+    def _output(self, each: Input) -> int:
         first = each.channels[0]
-        return self._recording.add(each.output, first.type, *as_ros2(first), _profile(each))
+        return self._recording.add(each.output, first.type, *as_ros2(first), _profile(each)).channel
 
     def _add_bundles(self, binding: GroupBinding, config: BundleConfig) -> _Bundles | None:
         recorded = recorded_bundle(binding.group, [channel for each in binding.inputs for channel in each.channels])
@@ -162,6 +204,12 @@ class SetWriter:
 def _profile(each: Input) -> Profile:
     """Return what an input's messages leave with."""
     return matched(each.config.qos, [profile for channel in each.channels for profile in channel.qos])
+
+
+def _members(group: GroupConfig, each: Input) -> dict[Channel, _Member]:
+    ways = {channel: outgoing(each, channel) for channel in each.channels}
+    keeps_stamps = group.restamp is None and each.config.is_by_header
+    return {channel: _Member(way.written, keeps_stamps or not way.has_header) for channel, way in ways.items()}
 
 
 def outgoing(each: Input, channel: Channel) -> Outgoing:

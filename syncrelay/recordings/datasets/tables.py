@@ -23,12 +23,12 @@ from syncrelay.recordings.bag.bindings import GroupBinding, Input
 from syncrelay.recordings.bag.definitions import typestore
 from syncrelay.recordings.bag.mcap_output import Compression
 from syncrelay.recordings.bag.recording import Channel, Definition
-from syncrelay.recordings.bag.replay import received
+from syncrelay.recordings.bag.replay import Left, received
 from syncrelay.recordings.bag.writing import Outgoing, outgoing
 from syncrelay.recordings.datasets.decoding import Decoder
 from syncrelay.recordings.datasets.images import IMAGE, NEEDED, ImageColumn, ImageFormat
 from syncrelay.recordings.datasets.message_types import arrow_type
-from syncrelay.sync import Match, Message, Outcome
+from syncrelay.sync import Match, Message
 
 _LARGEST: Final = 2**63 - 1
 _TIME: Final = pa.timestamp("ns", tz="UTC")
@@ -76,13 +76,14 @@ class SetTable:
         self._left: list[int] = []
         self._schema: pa.Schema | None = None
 
-    def take(self, binding: GroupBinding, outcome: Outcome, now: int) -> None:
-        """Gather a set of this group that leaves at `now`."""
-        if binding is not self.binding or not isinstance(outcome, Match):
-            return
-        self._matches.append(outcome)
-        self._left.append(now)
-        self.bytes += sum([len(each.payload[2]) for each in outcome.messages if each is not None])
+    def take(self, left: Sequence[Left]) -> None:
+        """Gather the sets of this group."""
+        for binding, outcomes, now in left:
+            for outcome in outcomes if binding is self.binding else ():
+                if isinstance(outcome, Match):
+                    self._matches.append(outcome)
+                    self._left.append(now)
+                    self.bytes += sum([len(each.payload[2]) for each in outcome.messages if each is not None])
 
     @property
     def gathered(self) -> int:

@@ -20,6 +20,7 @@ from syncrelay.recordings.bag.payloads import message_reader
 from syncrelay.recordings.bag.recording import Definition, RawMessage
 from syncrelay.recordings.bag.replay import replay
 from syncrelay.sync import DropReason, Match, Message, Outcome
+from tests.recordings.bag.reading import one_by_one
 from tests.ros.cdr_messages import STORE, VECTOR, vector
 from tests.ros.configs import config, inputs
 from tests.ros.streams import MS
@@ -122,7 +123,7 @@ def _replayed(recording, bindings):
             message = outcome.message
             drops.append(DropOut(message.input, message.stamp, message.payload[1], outcome.reason))
 
-    (result,) = replay(recording, bindings, listeners=[listen])
+    (result,) = replay(recording, bindings, listeners=[one_by_one(listen)])
     return sets, drops, [each.counts for each in result.inputs]
 
 

@@ -1,7 +1,7 @@
 """Recordings as tests read them: all of their messages as frames, or bound to the groups of a file."""
 
 import resource
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -9,6 +9,8 @@ from typing import NamedTuple
 from syncrelay.config import load_text
 from syncrelay.recordings.bag import Recording, open_recording
 from syncrelay.recordings.bag.bindings import GroupBinding, bind
+from syncrelay.recordings.bag.replay import Left, Listener
+from syncrelay.sync import Outcome
 from syncrelay.urls import redacted
 from tests.ros.frames import Frame
 
@@ -41,6 +43,17 @@ def bound(*words: Path | str, text: str) -> Iterator[tuple[Recording, tuple[Grou
     """Open a recording, with the groups of a file's text as it fills them."""
     with closing(open_recording([str(word) for word in words])) as recording:
         yield recording, bind(load_text(text), recording)
+
+
+def one_by_one(note: Callable[[GroupBinding, Outcome, int], object]) -> Listener:
+    """Return a listener of a replay that notes each set and drop."""
+
+    def listen(left: Sequence[Left]) -> None:
+        for binding, outcomes, now in left:
+            for outcome in outcomes:
+                note(binding, outcome, now)
+
+    return listen
 
 
 @contextmanager

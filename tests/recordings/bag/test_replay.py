@@ -6,7 +6,7 @@ from syncrelay.errors import BagError
 from syncrelay.recordings.bag.replay import replay
 from syncrelay.sync import Drop, DropReason, Match
 from tests.recordings.bag.making import CUSTOM, CUSTOM_STORE, blip, rig, write_mcap, write_ros1
-from tests.recordings.bag.reading import bound
+from tests.recordings.bag.reading import bound, one_by_one
 from tests.ros.cdr_messages import TIME_REFERENCE, VECTOR, header, serialize, time
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
@@ -23,7 +23,8 @@ def _replayed(path, group, **file_keys):
     """The sets and drops with the moments at which they left, and the result of the one group."""
     left = []
     with bound(path, text=config({"front": group}, **file_keys)) as (recording, bindings):
-        (result,) = replay(recording, bindings, listeners=[lambda _, outcome, now: left.append((outcome, now))])
+        listener = one_by_one(lambda _, outcome, now: left.append((outcome, now)))
+        (result,) = replay(recording, bindings, listeners=[listener])
     return left, result
 
 

@@ -15,7 +15,7 @@ from syncrelay.recordings.bag.replay import replay
 from syncrelay.sync import Drop, DropReason, Match
 from tests.cli.command import run_here
 from tests.recordings.bag.making import CUSTOM_STORE, HEADERLESS, write_mcap, write_ros1, write_rosbag2
-from tests.recordings.bag.reading import bound
+from tests.recordings.bag.reading import bound, one_by_one
 from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
@@ -52,7 +52,8 @@ def frames(*, count=40, late=30 * MS, frame="camera", moving="/tf"):
 def replayed(path, text=FILE):
     left = []
     with bound(path, text=text) as (recording, bindings):
-        (result,) = replay(recording, bindings, listeners=[lambda _, outcome, now: left.append((outcome, now))])
+        listener = one_by_one(lambda _, outcome, now: left.append((outcome, now)))
+        (result,) = replay(recording, bindings, listeners=[listener])
     return left, result
 
 

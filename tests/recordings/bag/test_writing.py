@@ -1,14 +1,19 @@
 """What a replay writes is what the relay would publish, and others can read it."""
 
+import random
+from itertools import accumulate
 from pathlib import Path
 
 import pytest
 import yaml
+from mcap.records import Channel, Chunk, Message, MessageIndex
+from mcap.stream_reader import StreamReader, breakup_chunk
 from rosbags.interfaces import ConnectionExtRosbag2, QosDurability, QosReliability
 from rosbags.rosbag2 import Reader, StoragePlugin
 
-from syncrelay.config.profile import PRESETS
+from syncrelay.config.profile import PRESETS, Profile
 from syncrelay.errors import OutputError
+from syncrelay.recordings.bag.definitions import jazzy_definition
 from syncrelay.recordings.bag.mcap_output import McapOutput
 from syncrelay.recordings.bag.qos import read_profiles, write_profile
 from syncrelay.recordings.bag.replay import replay
@@ -21,6 +26,7 @@ from tests.ros.frames import Frame
 from tests.ros.manifests import read
 
 _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
+_TOPICS = tuple(_PAIR)
 _RIG = rig(10)
 
 
@@ -138,6 +144,43 @@ def test_a_manifest_tells_the_stamps_that_messages_leave_with_whatever_they_are_
         left = [stamp_of(payload) for payload in payloads(written, f"/front{topic}")]
         assert [each.inputs[index].stamp for each in told] == left
         assert left != [each.inputs[index].original_stamp for each in told]
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
+def test_messages_are_in_chunks_of_a_megabyte_with_an_index_each(compression, tmp_path):
+    chance, definition, channels = random.Random(1), jazzy_definition(VECTOR), {}
+    sizes = [*(chance.randrange(300_000) for _ in range(40)), 3_000_000, 0, 7]
+    sent = [(chance.choice(_TOPICS), chance.randbytes(size) + bytes(size)) for size in sizes]
+    with McapOutput(tmp_path / "out.mcap", compression=compression) as written:
+        outputs = {topic: written.add(topic, VECTOR, *definition, Profile()) for topic in _TOPICS}
+        for number, (topic, payload) in enumerate(sent):
+            written.write(outputs[topic], payload, 1000 - number)
+            assert written.count == number + 1
+    chunks, found, indexed = [], [], 0
+    with (tmp_path / "out.mcap").open("rb") as file:
+        for record in StreamReader(file, emit_chunks=True).records:
+            if isinstance(record, Channel):
+                channels[record.id] = record.topic
+            elif isinstance(record, Chunk):
+                messages = [each for each in breakup_chunk(record, validate_crc=True) if isinstance(each, Message)]
+                found += messages
+                chunks.append([31 + len(each.data) for each in messages])
+                places = list(zip(messages, accumulate(chunks[-1], initial=0), strict=False))
+                assert record.message_start_time == messages[-1].log_time
+                assert record.message_end_time == messages[0].log_time
+            elif isinstance(record, MessageIndex):
+                own = [(each.log_time, place) for each, place in places if each.channel_id == record.channel_id]
+                assert record.records == own
+                indexed += len(own)
+    assert [(channels[each.channel_id], each.data) for each in found] == sent
+    assert [each.log_time for each in found] == [1000 - number for number in range(len(sent))]
+    for number in channels:
+        of_channel = [each.sequence for each in found if each.channel_id == number]
+        assert of_channel == list(range(len(of_channel)))
+    # A chunk is full with the message that makes a megabyte of it.
+    assert all(sum(each[:-1]) < 2**20 for each in chunks)
+    assert all(sum(each) >= 2**20 for each in chunks[:-1])
+    assert (indexed, len(chunks) > 8) == (len(sent), True)
 
 
 def test_nothing_is_overwritten(tmp_path):

@@ -18,6 +18,7 @@ from syncrelay.recordings.datasets.message_types import arrow_type
 from syncrelay.recordings.datasets.reading import SetsOf
 from syncrelay.recordings.datasets.tables import Content
 from syncrelay.sync import Match
+from tests.recordings.bag.reading import one_by_one
 from tests.recordings.datasets.reference_decoder import decode
 from tests.recordings.datasets.times import rows_of
 
@@ -74,7 +75,7 @@ def test_every_set_is_a_row_and_every_message_is_decoded(name, real_data):
             told[binding.group.name].append((outcome.stamps, now, now - last))
 
     with closing(open_recording([str(real_data / name)])) as recording:
-        for _ in Replay(recording, bind(config, recording), listeners=[note]).steps():
+        for _ in Replay(recording, bind(config, recording), listeners=[one_by_one(note)]).steps():
             pass
     rows: dict[str, list[tuple[object, ...]]] = {group.name: [] for group in config.groups}
     with closing(open_recording([str(real_data / name)])) as recording:
