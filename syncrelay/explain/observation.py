@@ -63,7 +63,7 @@ class Observation:
         self._need(config.enough([each.fed for each in nothing]))
         self._nearest, self._nearest_at, self._nearest_since = no_values(), no_values(), no_values()
         self._measured_at = began
-        self._changed_at = 0
+        self._changed_at = began
         self._sets_since_without = [0] * len(self.inputs)
 
     def add(
@@ -139,7 +139,7 @@ class Observation:
         self._polls = deque(poll._replace(at=at, sent=0) for poll in [*self._polls][-1:])
         self.inputs = [InputObservation() for _ in self.inputs]
         self._share.clear()
-        self._changed_at = 0
+        self._changed_at = at
         self._sets_since_without = [0] * len(self.inputs)
         self._forget_nearest()
         self._clear_nearest_spans()
