@@ -91,7 +91,7 @@ class ManifestWriter:
                 matched = list(map(add, stamps, offsets))
             header = max(stamps) if common is None else common
             begins.append(_BEGIN(0, 1, 0, 0, *divmod(header, _NS_PER_SECOND)))
-            row = [note.number, len(missing), max(matched) - min(matched), note.latency]
+            row = [note.number, max(matched) - min(matched), note.latency]
             if common is not None:
                 row.append(common)
             if self._bundle is not None:
@@ -117,8 +117,8 @@ class ManifestWriter:
         kinds = [None if index in note.missing else unpublished.get(index, "") for index in inputs]
         # None is the place of digits.
         parts: list[bytes | None] = [self._head(len(note.missing), sum(map(bool, kinds)), unpublished.get(len(inputs)))]
-        for name in ("set", "missing", "span_ns", "latency_ns"):
-            parts += (_key(name), *_number(next(sizes)))
+        parts += (_key("set"), *_number(next(sizes)), _key("missing"), _text(str(len(note.missing))))
+        parts += (_key("span_ns"), *_number(next(sizes)), _key("latency_ns"), *_number(next(sizes)))
         parts += (_key("common_stamp_ns"), *((_text(""),) if note.common is None else _number(next(sizes))))
         if self._bundle is not None:
             parts += (_key("bundle"), self._bundle, _key("bundle_sequence"), *_number(next(sizes)))
