@@ -15,7 +15,7 @@ _SLOP_S = 0.02
 _HZ = 10
 _LASTS_S = 40
 # All causes are named at these, but for an input that never came.
-_SEEDS = chosen(short=[3, 9, 14], long=[*range(40)])
+_SEEDS = chosen(short=[1, 3, 28], long=[*range(40)])
 
 
 @dataclass
