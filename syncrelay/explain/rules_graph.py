@@ -21,6 +21,8 @@ _AS_LONG: Final = 0.8
 _MISSED_PERIODS: Final = 2
 # Inputs that fell silent within this time did so together.
 _TOGETHER: Final = 2 * SECOND
+# The graph shows a publisher no longer after its first message.
+_SHOWN: Final = 2 * SECOND
 # So many names are read in a sentence.
 _FEW: Final = 3
 # A pause is reported if it is this many times the longest before.
@@ -341,7 +343,7 @@ def _is_silent(facts: GroupFacts, an_input: InputFacts, quiet: int) -> bool:
 
 
 def _is_there(facts: GroupFacts, an_input: InputFacts, quiet: int) -> str:
-    if (served_since := an_input.served_since) is not None and facts.figures.now - served_since < quiet:
+    if (served_since := an_input.served_since) is not None and facts.figures.now - served_since < quiet - _SHOWN:
         return f"has published it again for {words.seconds(facts.figures.now - served_since)}"
     return (
         "still publishes it" if quiet > _LEASE else "publishes it or has died: a dead node stays in the graph for 20 s"

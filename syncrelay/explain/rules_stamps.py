@@ -31,6 +31,8 @@ _LEAST_DELAY: Final = 0.1
 _FAULTY: Final = 0.01
 _SOME: Final = 0.02
 _MOST: Final = 0.5
+# No clock that is kept is so far off.
+_AHEAD: Final = SECOND // 2
 # A computation may take this long. Older stamps come from another clock.
 _LATENCY: Final = 10 * SECOND
 # Stamps that step there and back this often come from two clocks.
@@ -98,7 +100,10 @@ def other_clock(facts: GroupFacts) -> Found:
         return
     misread = list(_misread(facts))
     yield from misread
-    if misread or facts.ticks_hz is not None or not (facts.has_stopped or any(map(_is_ahead, facts.inputs))):
+    last = [delay - each.offset for each in facts.inputs for delay in each.figures.delays[-1:]]
+    # Nothing is stamped ahead of its time, but simulated time is told late itself.
+    is_ahead = facts.clock is None and min(last, default=0) < -_AHEAD
+    if misread or facts.ticks_hz is not None or not (facts.has_stopped or is_ahead):
         return
     # Two messages show whether their stamps run as time does.
     delays = {
@@ -111,11 +116,12 @@ def other_clock(facts: GroupFacts) -> Found:
         return
     usual = usual_delay(known.values())
     # What waited for the relay seems as late as that.
-    limit = max(_OTHER_CLOCK, facts.tolerance.ns if facts.tolerance else 0, 2 * max(waited_for_relay(facts)))
+    least = _OTHER_CLOCK if facts.has_stopped else _AHEAD
+    limit = max(least, facts.tolerance.ns if facts.tolerance else 0, 2 * max(waited_for_relay(facts)))
     off = {index: behind for index, delay in known.items() if abs(behind := delay - usual) > limit}
     if not facts.has_stopped:
-        # What is behind may be a result that takes so long. Simulated time is told late itself.
-        off = {index: by for index, by in off.items() if 2 * known[index] < by < 0 and facts.clock is None}
+        # What is behind may be a result that takes so long.
+        off = {index: behind for index, behind in off.items() if known[index] < -_AHEAD}
     usually = [facts.inputs[index].name for index in known if index not in off]
     whose = "the other inputs" if len(off) == 1 < len(usually) else all_of(usually)
     for index, behind in sorted(off.items(), key=lambda each: -abs(each[1]) // SECOND):
@@ -133,12 +139,6 @@ def other_clock(facts: GroupFacts) -> Found:
         right = _to_the_usual_time(facts, an_input, scale)
         otherwise = "" if scale else _wait_for_it(facts, index, behind) or _if_recorded(facts, index, behind)
         yield Fault(text, f"{right}{mapped}{otherwise}", blocks(facts, an_input), input=index)
-
-
-def _is_ahead(an_input: InputFacts) -> bool:
-    """Whether its last message is stamped for a time that had not come when it was received."""
-    delays = an_input.figures.delays
-    return bool(delays) and delays[-1] - an_input.offset < -_OTHER_CLOCK // 2
 
 
 def _to_the_usual_time(facts: GroupFacts, an_input: InputFacts, scale: TimeScale | None) -> str:
