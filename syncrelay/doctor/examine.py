@@ -11,13 +11,21 @@ from syncrelay.doctor.container import check_isolation, look_at_isolation
 from syncrelay.doctor.diagnosis import Diagnosis, info, worst_first
 from syncrelay.doctor.discovery import check_discovery
 from syncrelay.doctor.folders import check_folders
-from syncrelay.doctor.graph import check_clock, check_graph, check_groups, check_own_name, check_sizes, check_state
+from syncrelay.doctor.graph import (
+    check_clock,
+    check_domains,
+    check_graph,
+    check_groups,
+    check_own_name,
+    check_sizes,
+    check_state,
+)
 from syncrelay.doctor.installation import Installation, check_installation, look_at_installation, middleware_of
 from syncrelay.doctor.network import check_network, look_at_interfaces
 from syncrelay.doctor.shared_memory import check_shared_memory, look_at_shared_memory
 from syncrelay.doctor.start import Plan, StartResult, check_start, start_node
 from syncrelay.doctor.transport import check_transport, uses_defaults, uses_shared_memory
-from syncrelay.environment.domain import domain_of, range_of
+from syncrelay.environment.domain import domain_of, domains_in_use, range_of
 from syncrelay.explain import GraphSnapshot, GroupReport
 
 # Of a managed node that does not answer nothing is known.
@@ -173,6 +181,7 @@ def _of_graph(
     observed: Observed, config: Config | None, started: StartResult, environ: Mapping[str, str]
 ) -> Iterator[Diagnosis]:
     yield from check_graph(observed.graph)
+    yield from check_domains(observed.graph, observed.reports, domains_in_use())
     if config is None:
         return
     yield from check_clock(observed.graph, use_sim_time=started.use_sim_time)

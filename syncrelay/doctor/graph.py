@@ -11,12 +11,12 @@ from syncrelay.explain import Severity as Judged
 
 _SEVERITIES: Final = {Judged.WARN: Severity.WARNING, Judged.ERROR: Severity.ERROR}
 # Advice of the relay that leads here, and what it leads to.
-_NEXT: Final = {
-    Code.SILENT: "check with `ros2 topic hz` whether it is sending, on its own machine, in its own container and as its"
-    " own user;\nif it is, messages get lost on the way: export FASTDDS_BUILTIN_TRANSPORTS=UDPv4 on both sides, and"
-    " restart both",
-    Code.STARTING: "run it again with a larger --seconds",
-}
+_HERE: Final = "if so, run `syncrelay doctor --config FILE --live`"
+_NEXT: Final = (
+    "on its own machine, in its own container and as its own user;\nif so, messages get lost on the way: export"
+    " FASTDDS_BUILTIN_TRANSPORTS=UDPv4 on both sides, and restart both"
+)
+_AGAIN: Final = "run it again with a larger --seconds"
 # Fast DDS's shared memory by default, in bytes: a message has to fit into it as a whole.
 _SEGMENT: Final = 512 * 1024
 
@@ -42,6 +42,19 @@ def check_graph(graph: GraphSnapshot) -> Iterator[Diagnosis]:
             impact="nothing can be received here",
             fix="start the robot's nodes; if they are running, compare ROS_DOMAIN_ID, RMW_IMPLEMENTATION and\n"
             "ROS_AUTOMATIC_DISCOVERY_RANGE on both sides, and try a larger --seconds",
+        )
+
+
+def check_domains(graph: GraphSnapshot, reports: Iterable[GroupReport], in_use: Iterable[int]) -> Iterator[Diagnosis]:
+    """Yield that nodes of this machine are on other domains, where somebody is missing on this one."""
+    others = [str(each) for each in sorted({*in_use} - {graph.domain})]
+    is_missing = not graph.nodes or any(not each.graph.publishers for one in reports for each in one.facts.inputs)
+    if others and is_missing:
+        yield info(
+            "other_domain",
+            f"nodes of this machine are on {'domain' if len(others) == 1 else 'domains'} {all_of(others)}",
+            impact=f"whoever looks on domain {graph.domain} does not find them",
+            fix="if one of them should be found here, start it with the same ROS_DOMAIN_ID",
         )
 
 
@@ -125,7 +138,9 @@ def _diagnosis(shared: Sequence[tuple[GroupReport, Finding]]) -> Diagnosis:
         _SEVERITIES.get(finding.severity, Severity.WARNING),
         f"{names}: {finding.text}",
         f"no sets from {names}" if is_fatal else None,
-        _NEXT.get(finding.code, finding.suggestion),
+        _AGAIN
+        if finding.code is Code.STARTING
+        else (finding.suggestion or "").replace(f"; {_HERE}", f", {_NEXT}") or None,
     )
 
 

@@ -3,6 +3,7 @@
 import ctypes
 import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Final
 
 from syncrelay.errors import RosUnavailableError
@@ -14,6 +15,7 @@ _LARGEST_DOMAIN: Final = 232
 # DDS: 250 UDP ports for each domain, from 7400 on.
 _FIRST_PORT: Final = 7400
 _PORTS: Final = 250
+_FIRST_PAIR: Final = 10
 # rcl reads the number with it, so that here is read what rcl will read: of 010 eight, of 0x1f 31, of "7x" seven.
 _strtoul: Final = ctypes.CDLL(None).strtoul
 _strtoul.argtypes = (ctypes.c_char_p, ctypes.POINTER(ctypes.c_char_p), ctypes.c_int)
@@ -34,6 +36,19 @@ def domain_of(environ: Mapping[str, str]) -> int | None:
 def ports_of(domain: int) -> range:
     """Return the UDP ports of a domain; Fast DDS numbers its ports in shared memory alike."""
     return range(_FIRST_PORT + _PORTS * domain, _FIRST_PORT + _PORTS * (domain + 1))
+
+
+def domains_in_use() -> frozenset[int]:
+    """Return the domains of nodes in this network namespace, by the UDP ports that they hold."""
+    tables = [path for path in (Path("/proc/net/udp"), Path("/proc/net/udp6")) if path.exists()]
+    rows = [row.split() for table in tables for row in table.read_text().splitlines()[1:]]
+    held = {int(row[1].rpartition(":")[2], 16) for row in rows}
+    # DDS: each participant has two in a row, the first of them even.
+    pairs = (
+        port for port in held if port % 2 == 0 and port + 1 in held and (port - _FIRST_PORT) % _PORTS >= _FIRST_PAIR
+    )
+    domains = ((port - _FIRST_PORT) // _PORTS for port in pairs)
+    return frozenset(domain for domain in domains if 0 <= domain <= _LARGEST_DOMAIN)
 
 
 def range_of(environ: Mapping[str, str]) -> str:

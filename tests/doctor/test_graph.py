@@ -5,7 +5,15 @@ from dataclasses import replace
 import pytest
 
 from syncrelay.doctor.diagnosis import Severity
-from syncrelay.doctor.graph import check_clock, check_graph, check_groups, check_own_name, check_sizes, check_state
+from syncrelay.doctor.graph import (
+    check_clock,
+    check_domains,
+    check_graph,
+    check_groups,
+    check_own_name,
+    check_sizes,
+    check_state,
+)
 from syncrelay.explain import Code, Endpoint, GraphSnapshot, GroupReport, judge
 from syncrelay.sync.counts import InputCounts
 from tests.explain.support.groups import IMAGE, NOW, S, a_group, a_silent_group, an_input
@@ -102,6 +110,24 @@ def test_a_silent_topic_leads_no_further_than_here():
     assert found.fix is not None
     assert "doctor" not in found.fix
     assert "FASTDDS_BUILTIN_TRANSPORTS=UDPv4" in found.fix
+
+
+def test_a_managed_node_that_is_silent_is_told_with_its_state_and_one_that_was_heard_with_no_loss():
+    (found,) = check_groups([report(a_silent_group(silent(managed=("/driver",)), an_input("/lidar")))], [])
+    assert "`ros2 lifecycle get /driver`" in (found.fix or "")
+    heard = an_input(figures={"rate_hz": 0.0, "last_received": NOW - 7 * S, "fed": 0})
+    (found,) = check_groups([report(a_silent_group(heard, an_input("/lidar")))], [])
+    assert found.code == "silent"
+    assert "FASTDDS" not in (found.fix or "")
+
+
+def test_nodes_on_other_domains_are_told_where_somebody_is_missing():
+    whole, lacking = a_group(), a_silent_group(unpublished("/camera"), an_input("/lidar"))
+    (found,) = check_domains(GRAPH, [report(lacking)], [0, 3, 42])
+    assert (found.code, found.what) == ("other_domain", "nodes of this machine are on domains 0 and 42")
+    assert list(check_domains(GRAPH, [report(lacking)], [3])) == []
+    assert list(check_domains(GRAPH, [report(whole)], [0])) == []
+    assert brief(check_domains(replace(GRAPH, nodes=()), [], [0])) == [("other_domain", INFO)]
 
 
 def test_a_group_without_a_set_in_too_short_a_time_is_a_warning_and_a_healthy_one_is_nothing():

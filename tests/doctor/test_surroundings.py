@@ -1,5 +1,7 @@
 """The checks of environment, network, memory and limits, by values."""
 
+import socket
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,7 +13,7 @@ from syncrelay.doctor.folders import check_folders
 from syncrelay.doctor.network import Interface, check_network
 from syncrelay.doctor.shared_memory import SharedMemory, ShmFile, check_shared_memory
 from syncrelay.doctor.transport import check_transport, uses_defaults, uses_shared_memory
-from syncrelay.environment.domain import domain_of, range_of
+from syncrelay.environment.domain import domain_of, domains_in_use, ports_of, range_of
 from syncrelay.environment.transport import PROFILES
 
 ERROR, INFO = Severity.ERROR, Severity.INFO
@@ -226,3 +228,17 @@ CONTAINER = Isolation("/.dockerenv", host_network=True, private_shm=True)
 )
 def test_isolation(isolation, environ, found):
     assert brief(check_isolation(isolation, environ)) == found
+
+
+def test_a_domain_is_in_use_while_a_participant_holds_its_two_ports():
+    domain = 231
+    ports = ports_of(domain)[24:26]
+    assert domain not in domains_in_use()
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one,
+        socket.socket(socket.AF_INET6, socket.SOCK_DGRAM) as two,
+    ):
+        one.bind(("127.0.0.1", ports[0]))
+        assert domain not in domains_in_use()
+        two.bind(("::1", ports[1]))
+        assert domain in domains_in_use()
