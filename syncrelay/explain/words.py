@@ -40,9 +40,14 @@ def behind(nanoseconds: int) -> str:
     return f"{span_of_time(abs(nanoseconds))} {'behind' if nanoseconds > 0 else 'ahead of'}"
 
 
+def earlier(nanoseconds: float) -> str:
+    """Return by how much something is earlier than another: `5 ms before`, or `5 ms after` for a negative time."""
+    return f"{span_of_time(abs(nanoseconds))} {'before' if nanoseconds > 0 else 'after'}"
+
+
 def rate(hertz: float) -> str:
-    """Return a rate with its unit, such as 19.9 Hz."""
-    return f"{figure(hertz)} Hz"
+    """Return a rate with its unit, such as 19.9 Hz, or 0.00056 Hz."""
+    return f"{figure(hertz)} Hz" if hertz >= 0.01 or not hertz else f"{hertz:.2g} Hz"  # noqa: PLR2004  as _digits
 
 
 def figure(number: float) -> str:

@@ -92,6 +92,17 @@ def test_topics_without_a_file_get_one(folder, tmp_path):
     assert read_summary(replayed.stdout)["matched"].sets == 100
 
 
+def test_what_was_received_before_its_stamp_is_said_to_have_been(tmp_path):
+    # A message in four is 6 ms early, the others 5 ms.
+    early = [each._replace(time=each.time - (10 + (place % 8 < 2)) * MS) for place, each in enumerate(rig(100))]
+    write_mcap(tmp_path / "rig.mcap", early)
+    said = "received 5 ms before the stamp"
+    assert run_here("analyze", "rig.mcap", folder=tmp_path).stdout.count("  5 ms after receipt\n") == 2
+    measured = run_here("analyze", "rig.mcap", *_TOPICS, folder=tmp_path).stdout
+    assert measured.count(f"  {said} (90 % between 5 ms and 6 ms, at most 6 ms)\n") == 2
+    assert run_here("init", "--from-bag", "rig.mcap", folder=tmp_path).stdout.count(f"  # 10 Hz, {said}\n") == 2
+
+
 _INVENTORY = f"""\
 other rig.mcap: 9.9 s, 300 messages of 4 topics
   topic    type                              messages  rate   stamps

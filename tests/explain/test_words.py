@@ -41,7 +41,16 @@ READ: dict[Callable[[Any], str], dict[float, str]] = {
         3 * DAY: "3 days",
         315_964_782 * S: "10 years",
     },
-    words.rate: {19.94: "19.9 Hz", 10.0: "10 Hz", 0.104: "0.1 Hz", 199.8: "200 Hz", 9.998: "10 Hz"},
+    words.earlier: {5 * MS: "5 ms before", -5 * MS: "5 ms after", -3 * DAY: "3 days after"},
+    words.rate: {
+        19.94: "19.9 Hz",
+        10.0: "10 Hz",
+        0.104: "0.1 Hz",
+        199.8: "200 Hz",
+        9.998: "10 Hz",
+        0.000555: "0.00056 Hz",
+        0: "0 Hz",
+    },
     words.share: {0: "0 %", 0.001: "less than 1 %", 0.05: "5 %", 0.5: "50 %", 0.999: "99 %", 1: "100 %"},
     words.at_least: {
         0: "1ns",

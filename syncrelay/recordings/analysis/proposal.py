@@ -140,7 +140,7 @@ def _evidence(topic: Topic) -> str:
     figures = topic.figures
     said = [words.rate(figures.rate_hz)]
     if figures.delay is not None:
-        said.append(f"received {words.span_of_time(figures.delay.median)} after the stamp")
+        said.append(f"received {words.earlier(-figures.delay.median)} the stamp")
     said += [counted(figures.gaps, "gap")] if figures.gaps else []
     said += [f"{figures.duplicates} repeated"] if figures.duplicates else []
     said += sorted({profile.reliability for profile in topic.channel.qos})

@@ -73,15 +73,20 @@ def period_text(topic: TopicFigures) -> str:
 
 
 def delay_line(topic: TopicFigures) -> str:
-    """Return how long after their stamps the messages of a topic were received; `topic.delay` must be known."""
+    """Return how long after or before their stamps a topic's messages were received; `topic.delay` must be known."""
     delay = topic.delay
     assert delay is not None  # noqa: S101  see above
     drift = "" if topic.drift_ppm is None else f"; drift {words.figure(topic.drift_ppm)} ppm"
+    is_after = delay.median >= 0
+    side = "after" if is_after else "before"
     if abs(delay.median) >= _SECOND:
-        return f"received {_long(abs(delay.median))} {'after' if delay.median > 0 else 'before'} the stamp{drift}"
-    low, middle, high, most = (words.duration(each) for each in (delay.low, delay.median, delay.high, delay.greatest))
+        return f"received {_long(abs(delay.median))} {side} the stamp{drift}"
+    figures = (delay.low, delay.median, delay.high, delay.greatest)
+    if not is_after:
+        figures = (-delay.high, -delay.median, -delay.low, -delay.least)
+    low, middle, high, most = map(words.duration, figures)
     spread = "" if low == most else f" (90 % between {low} and {high}, at most {most})"
-    return f"received {middle} after the stamp{spread}{drift}"
+    return f"received {middle} {side} the stamp{spread}{drift}"
 
 
 def _long(nanoseconds: int) -> str:
@@ -235,7 +240,7 @@ def _stamps(topic: Topic) -> str:
     faults, delay = faults_of(topic.figures), topic.figures.delay
     if delay is None:
         return ", ".join(faults) or "equal to receipt"
-    return ", ".join([f"{words.span_of_time(delay.median)} before receipt", *faults])
+    return ", ".join([f"{words.earlier(delay.median)} receipt", *faults])
 
 
 def _next(bag: str, fit: Sequence[str]) -> Iterator[str]:
