@@ -102,13 +102,18 @@ def _write(part: Path, frames: list[Frame]) -> None:
 
 
 def _split(folder: Path, chance: random.Random) -> tuple[list[Path], str]:
-    """A rosbag2 folder of several files, with the metadata.yaml that rosbag2 writes."""
+    """A rosbag2 folder of several files, with the metadata.yaml that rosbag2 writes; those that hold messages."""
     folder.mkdir()
     suffix = chance.choice((".mcap", ".db3"))
     parts = [folder / f"{folder.name}_{number}{suffix}" for number in range(chance.randrange(2, 5))]
     held = [_frames(part, parts) for part in parts]
     for part, frames in zip(parts, held, strict=True):
         _write(part, frames)
+    listed = list(zip(parts, map(len, held), strict=True))
+    if chance.random() < 0.4:
+        # The recorder ended just after it had begun another file.
+        listed.append((folder / f"{folder.name}_{len(parts)}{suffix}", 0))
+        _write(listed[-1][0], [])
     topics = [
         {"topic_metadata": {"name": name, "type": VECTOR, "offered_qos_profiles": []}, "message_count": 40}
         for name in ("/camera", "/lidar")
@@ -117,8 +122,8 @@ def _split(folder: Path, chance: random.Random) -> tuple[list[Path], str]:
         "version": 9,
         "message_count": 80,
         "topics_with_message_count": topics,
-        "relative_file_paths": [part.name for part in parts],
-        "files": [{"path": part.name, "message_count": len(each)} for part, each in zip(parts, held, strict=True)],
+        "relative_file_paths": [part.name for part, _ in listed],
+        "files": [{"path": part.name, "message_count": count} for part, count in listed],
     }
     if chance.random() < 0.3:
         # As before version 5.

@@ -90,4 +90,4 @@ def _missing(name: str, channels: Sequence[Channel]) -> str:
     if close is not None:
         return f"{name} is not in the recording, did you mean {quoted(close)}?"
     more = ", ..." if len(topics) > _MOST_LISTED else ""
-    return f"{name} is not in the recording, it has {', '.join(topics[:_MOST_LISTED])}{more}"
+    return f"{name} is not in the recording, it has {', '.join(topics[:_MOST_LISTED]) or 'no topics'}{more}"

@@ -101,9 +101,9 @@ class McapFile:
 
 
 def open_mcap(source: Source, name: str) -> McapFile:
-    """Open an MCAP file; raises BagError if nothing of it can be read, and NoIndexError as McapFile does."""
+    """Open an MCAP file; raises BagError if nothing of a damaged one can be read, and NoIndexError as McapFile does."""
     file = McapFile(source, name)
-    if not file.channels:
+    if file.faults and not file.channels:
         file.close()
-        raise BagError(f"{name}: no message can be read{': ' + file.faults[0] if file.faults else ', it is empty'}")
+        raise BagError(f"{name}: no message can be read: {file.faults[0]}")
     return file

@@ -66,7 +66,11 @@ class McapIndex:
         if not self._read_index():
             if not file.is_near:
                 raise NoIndexError
+            in_summary = self.schemas, self.channels
             self._scan()
+            # A recording without a message describes its topics in the summary alone.
+            if not (self.channels or losses.sentences):
+                self.schemas, self.channels = in_summary
 
     def _read_index(self) -> bool:
         """Take channels and chunks from the summary at the end of the file; False if there is none, or it is wrong."""

@@ -20,7 +20,7 @@ import pytest
 import zstandard
 from hypothesis import given
 from hypothesis import strategies as st
-from mcap.writer import IndexType
+from mcap.writer import IndexType, Writer
 from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
 from syncrelay.config.profile import Profile
@@ -291,6 +291,19 @@ def _encrypted() -> bytes:
     )
     header = b"".join(struct.pack("<I", len(each)) + each for each in fields)
     return b"#ROSBAG V2.0\n" + struct.pack("<I", len(header)) + header + bytes(4)
+
+
+@pytest.mark.parametrize("is_chunked", [True, False])
+def test_an_mcap_file_without_a_message_is_whole_and_has_its_topics(is_chunked, tmp_path):
+    with (tmp_path / "rig.mcap").open("wb") as file:
+        writer = Writer(file, use_chunking=is_chunked)
+        writer.start("ros2")
+        schema = writer.register_schema(VECTOR, "ros2msg", b"")
+        writer.register_channel("/camera", "cdr", schema)
+        writer.finish()
+    with closing(open_recording([str(tmp_path / "rig.mcap")])) as recording:
+        assert list(recording.batches(recording.channels)) == []
+        assert ([each.topic for each in recording.channels], recording.faults) == (["/camera"], [])
 
 
 @pytest.mark.parametrize(
