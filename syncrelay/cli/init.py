@@ -27,7 +27,8 @@ def parser() -> Parser:
         "syncrelay init",
         example="syncrelay init --from-bag drive.mcap -o fusion.yaml",
         description="Proposes a file for a recording or for a live ROS graph: groups of its topics, their types, and "
-        "values that fit, with what was measured as comments.",
+        "values that fit, with what was measured as comments. Exit code 1 if there is nothing to match, or part of the "
+        "recording is missing or cannot be read.",
     )
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument("--from-bag", metavar="BAG", help="a recording, as for replay; needs no ROS")
@@ -41,28 +42,35 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay init`: print a file, or write it where --output says."""
     if not arguments.from_graph and arguments.seconds is not None:
         parser.error("--seconds N needs --from-graph: it is how long to listen")
-    proposal = _from_graph(arguments.seconds or 10.0) if arguments.from_graph else _from_bag(arguments.from_bag)
+    if arguments.from_graph:
+        proposal, code = _from_graph(arguments.seconds or 10.0), DONE
+    else:
+        proposal, code = _from_bag(arguments.from_bag)
     for sentence in proposal.left_out:
         remark(printable(f"left out: {sentence}"))
     if arguments.output is None:
         put(proposal.text.rstrip())
     else:
         write_new(arguments.output, proposal.text)
-    return DONE
+    return code
 
 
-def _from_bag(bag: str) -> "Proposal":
-    """Raises BagError for a recording that cannot be read, NothingToMatchError where it holds too little."""
-    from syncrelay.cli.reading import reading
+def _from_bag(bag: str) -> "tuple[Proposal, int]":
+    """Return what is proposed for a recording, and the exit code: 1 if part of it is missing or cannot be read.
+
+    Raises BagError for a recording that cannot be read, NothingToMatchError where it holds too little.
+    """
+    from syncrelay.cli.reading import reading, tell_faults
     from syncrelay.recordings.analysis import propose
     from syncrelay.recordings.bag import open_recording
 
     with closing(open_recording([bag], tell=remark)) as recording:
-        with reading(recording):
-            proposal = propose(recording)
-        for fault in recording.faults:
-            remark(printable(fault))
-    return proposal
+        try:
+            with reading(recording):
+                proposal = propose(recording)
+        finally:
+            code = tell_faults(recording)
+    return proposal, code
 
 
 def _from_graph(seconds: float) -> "Proposal":

@@ -147,13 +147,14 @@ def drawn(folder) -> list[Drawn]:
     return draw(folder / "bags", COUNT)
 
 
-def test_replay_and_analyze_say_what_is_missing_and_exit_1(drawn, folder, figures):
+def test_replay_analyze_and_init_say_what_is_missing_and_exit_1(drawn, folder, figures):
     for each in drawn:
         name = str(each.path.relative_to(folder))
         for words in (
             ["replay", name, "--config", "f.yaml"],
             ["analyze", name, "--config", "f.yaml"],
             ["analyze", name],
+            ["init", "--from-bag", name],
         ):
             done = run_here(*words, folder=folder)
             context = (SEED, words, each.what, done.stderr)
