@@ -109,7 +109,7 @@ class InputFigures:
     @property
     def delay(self) -> int | None:
         """The median of the delays, None while all stamps are 0."""
-        return median_low(self.delays) if self.delays else None
+        return Distribution(self.delays).quantile(0.5) if self.delays else None
 
     @property
     def jitter(self) -> int | None:

@@ -67,9 +67,13 @@ def _sorted(messages: Received, offset: int) -> InOrder:
 
 def shifted(stamps: Nanoseconds, offset: int) -> Nanoseconds:
     """Add an offset to stamps, and keep them so far from the ends of 64 bits that they can be subtracted."""
-    near = np.clip(stamps, -_LATEST, _LATEST)
-    moved: Nanoseconds = np.clip(near + max(-_LATEST, min(_LATEST, offset)), -_LATEST, _LATEST)
-    return moved
+    return _clipped(_clipped(stamps) + max(-_LATEST, min(_LATEST, offset)))
+
+
+def _clipped(stamps: Nanoseconds) -> Nanoseconds:
+    # np.clip takes five times as long for a few hundred.
+    clipped: Nanoseconds = np.minimum(np.maximum(stamps, -_LATEST), _LATEST)
+    return clipped
 
 
 def extents(stamps: Nanoseconds, offsets: Sequence[int]) -> tuple[Nanoseconds, Nanoseconds]:

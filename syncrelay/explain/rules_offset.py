@@ -10,6 +10,7 @@ from syncrelay.explain.codes import Code
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Fault, Found, nodes
 from syncrelay.explain.nearest import quantile, shifted, signed_distances
+from syncrelay.explain.rows import blocks, quantiles
 from syncrelay.explain.rules_stamps import offered_offset, other_clock
 
 # Stamps a constant distance apart may pair wrong messages: at least this many, at least this share of a period apart,
@@ -70,9 +71,9 @@ def _whole_periods_off(facts: GroupFacts, first: int, other: int) -> int | None:
     # Amid two messages, now the one is nearest and now the other, a period apart: of these, the usual one counts.
     usual = quantile(signed, 0.5)
     signed -= (np.round((signed - usual) / period) * period).astype(np.int64)
-    if quantile(signed, 0.95) - quantile(signed, 0.05) > _SCATTERS * period:
+    low, distance, high = quantiles(lambda: blocks(signed), [0.05, 0.5, 0.95])
+    if high - low > _SCATTERS * period:
         return None
-    distance = quantile(signed, 0.5)
     delays = _late_by(one), _late_by(two)
     apart = distance + delays[1] - delays[0]
     whole = round(apart / period)

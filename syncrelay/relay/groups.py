@@ -242,7 +242,7 @@ class Groups:
 
     def expire(self, now: int) -> None:
         """Have the groups give up what has waited long enough. On the loop's thread."""
-        for group in self.bindings.groups:
+        for group in self._limited:
             group.expire(now if group.config.ticks is None else self._clock.stamping())
 
     def transforms_came(self) -> None:
