@@ -1,6 +1,5 @@
 """The finding that stamps of an input are off by a constant, so that sets hold messages of different moments."""
 
-from statistics import median_low
 from typing import Final
 
 import numpy as np
@@ -89,4 +88,4 @@ def _whole_periods_off(facts: GroupFacts, first: int, other: int) -> int | None:
 
 def _late_by(an_input: InputFacts) -> int:
     """Return how long after its stamp, offset added, a message usually comes."""
-    return median_low(an_input.figures.delays) - an_input.offset
+    return (an_input.figures.delay or 0) - an_input.offset
