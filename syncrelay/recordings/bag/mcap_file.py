@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterator
 from functools import partial
+from typing import Final
 
 from mcap.opcode import Opcode
 from mcap.records import Channel as ChannelRecord
@@ -14,9 +15,13 @@ from syncrelay.recordings.bag.mcap_index import McapIndex
 from syncrelay.recordings.bag.mcap_parts import Parts, is_mixed, is_needed
 from syncrelay.recordings.bag.mcap_records import RECORD, UNREADABLE, add_messages, parsed, unpacked
 from syncrelay.recordings.bag.qos import read_profiles
-from syncrelay.recordings.bag.recording import Channel, Definition, RawMessage
+from syncrelay.recordings.bag.recording import Channel, Definition, Encoding, RawMessage
 from syncrelay.recordings.bag.segments import Segment, extent, read_in_order
 from syncrelay.recordings.bag.sources import Source
+from syncrelay.recordings.bag.unpacking import NOT_UNPACKED, OF_NO_CONTENT, PACKED, unzstd
+
+# rosbag2 compresses all payloads or none. Damage may hide that of one.
+_FEW: Final = 3
 
 
 class McapFile:
@@ -89,7 +94,21 @@ class McapFile:
             if found:
                 self._effort.found_message()
             self._losses.damaged(f"the chunk at byte {segment.offset}", fault, read=len(found))
-        return found
+        return [*self._unpacked(found)] if any(map(_is_packed, found[:_FEW])) else found
+
+    def _unpacked(self, found: list[RawMessage]) -> Iterator[RawMessage]:
+        for message in found:
+            if not _is_packed(message):
+                yield message
+                continue
+            channel, time, payload = message
+            try:
+                content = unzstd(payload, self._effort)
+            except NOT_UNPACKED:
+                self._losses.leave_out(OF_NO_CONTENT)
+                continue
+            self._effort.found_message()
+            yield channel, time, content
 
     def _content(self, segment: Segment) -> bytes:
         if segment not in self._index.chunked:
@@ -98,6 +117,11 @@ class McapFile:
         if opcode != Opcode.CHUNK or length != segment.size - RECORD.size:
             raise ValueError("it does not match the index")
         return unpacked(parsed(Chunk, self._file.read(segment.offset + RECORD.size, length)), self._effort)
+
+
+def _is_packed(message: RawMessage) -> bool:
+    channel, _, payload = message
+    return payload.startswith(PACKED) and channel.encoding is Encoding.CDR
 
 
 def open_mcap(source: Source, name: str) -> McapFile:

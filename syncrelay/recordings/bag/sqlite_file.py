@@ -12,19 +12,16 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
 
-from zstandard import ZstdError
-
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag.effort import Effort
 from syncrelay.recordings.bag.losses import OF_NO_CHANNEL, OF_NO_TIME, Losses
 from syncrelay.recordings.bag.qos import read_profiles
 from syncrelay.recordings.bag.recording import LATEST, Channel, Definition, RawMessage, batched
-from syncrelay.recordings.bag.unpacking import unzstd
+from syncrelay.recordings.bag.unpacking import NOT_UNPACKED, OF_NO_CONTENT, PACKED, unzstd
 
 MAGIC: Final = b"SQLite format 3\0"
 """What every sqlite3 file begins with."""
 
-_ZSTD: Final = b"\x28\xb5\x2f\xfd"
 # This includes rows of unknown topics, so that they are reported.
 _BY_TIME: Final = """
 SELECT topic_id, timestamp, data FROM messages WHERE (topic_id IS NULL OR topic_id NOT IN ({})) ORDER BY timestamp"""
@@ -39,7 +36,6 @@ _KIND: Final = "SELECT DISTINCT type FROM pragma_table_list WHERE name = ? COLLA
 _HIDDEN: Final = 6
 # ValueError: an error text of sqlite3 that quotes a damaged name is no valid UTF-8.
 _UNREADABLE: Final = (sqlite3.Error, ValueError, MemoryError)
-_NOT_UNPACKED: Final = (ZstdError, ValueError, EOFError, MemoryError)
 # A row has at least ten bytes and takes some tens of steps; an endless view, or pages in a circle, take more.
 _STEPS_PER_BYTE: Final = 50
 _STEPS_AT_ONCE: Final = 1_000_000
@@ -60,7 +56,7 @@ class SqliteFile:
             # sorted: with a damaged index the first time may be the later one.
             self.begin, self.end = sorted(self._end(order) for order in ("ASC", "DESC"))
             first = self._database.execute(_FIRST_PAYLOADS)
-            self._is_packed = any(payload.startswith(_ZSTD) for (payload,) in first)
+            self._is_packed = any(payload.startswith(PACKED) for (payload,) in first)
         except _UNREADABLE as fault:
             self._database.close()
             raise BagError(f"{name}: cannot be read as a rosbag2 recording: {fault}") from fault
@@ -95,8 +91,8 @@ class SqliteFile:
                 self._require_stored(stored)
                 try:
                     content = unzstd(payload, effort) if self._is_packed else payload
-                except _NOT_UNPACKED:
-                    leave_out("the payload cannot be decompressed")
+                except NOT_UNPACKED:
+                    leave_out(OF_NO_CONTENT)
                     continue
                 effort.found_message()
                 yield channel, time, content

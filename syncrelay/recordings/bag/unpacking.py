@@ -8,6 +8,14 @@ import zstandard
 
 from syncrelay.recordings.bag.effort import Effort
 
+PACKED: Final = b"\x28\xb5\x2f\xfd"
+"""What a payload begins with that rosbag2 compressed by itself (`--compression-mode message`); CDR begins with 0."""
+
+NOT_UNPACKED: Final = (zstandard.ZstdError, ValueError, EOFError, MemoryError)
+"""What unzstd raises."""
+
+OF_NO_CONTENT: Final = "the payload cannot be decompressed"
+
 # A block of Zstandard holds at most 128 KiB and takes at least 4 bytes.
 _MOST_IN_A_BLOCK: Final = 1 << 17
 _LEAST_BLOCK: Final = 4

@@ -8,6 +8,7 @@ from pathlib import Path
 from mcap.writer import CompressionType, IndexType
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionMode
+from zstandard import compress
 
 from tests.recordings.bag.making import BEST_EFFORT, rig, write_mcap, write_ros1, write_rosbag2
 
@@ -26,6 +27,11 @@ Make = Callable[[Path], Path]
 
 def mcap(**options) -> Make:
     return lambda folder: write_mcap(folder / "rig.mcap", FRAMES, qos=[BEST_EFFORT], **{**_SMALL_CHUNKS, **options})
+
+
+def _mcap_of_compressed_messages(folder: Path) -> Path:
+    frames = [each._replace(payload=compress(each.payload)) for each in FRAMES]
+    return write_mcap(folder / "rig.mcap", frames, qos=[BEST_EFFORT], chunk_size=500)
 
 
 def sqlite(**options) -> Make:
@@ -53,6 +59,7 @@ KINDS: Mapping[str, Make] = {
     "MCAP, zstd": mcap(compression=CompressionType.ZSTD),
     "MCAP, lz4, without checksums": mcap(compression=CompressionType.LZ4, enable_crcs=False),
     "MCAP, zstd, without an index": mcap(compression=CompressionType.ZSTD, **NO_INDEX),
+    "MCAP, messages compressed": _mcap_of_compressed_messages,
     "MCAP without chunks": mcap(use_chunking=False),
     "MCAP without chunks or an index": mcap(use_chunking=False, **NO_INDEX),
     "ROS 1": ros1(),

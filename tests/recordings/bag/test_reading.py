@@ -80,6 +80,7 @@ _ALL_KINDS = {
     "sqlite3, file compressed": _rosbag2(mode=CompressionMode.FILE),
     "sqlite3, split": _split(_split_sqlite),
     "rosbag2 MCAP": _rosbag2(plugin=StoragePlugin.MCAP),
+    "rosbag2 MCAP, messages compressed": _rosbag2(plugin=StoragePlugin.MCAP, mode=CompressionMode.MESSAGE),
     "rosbag2 MCAP, chunks compressed": _rosbag2(plugin=StoragePlugin.MCAP, mode=CompressionMode.STORAGE),
     "rosbag2 MCAP, file compressed": _rosbag2(plugin=StoragePlugin.MCAP, mode=CompressionMode.FILE),
     "MCAP without an index, but a summary": mcap(index_types=IndexType.NONE),
