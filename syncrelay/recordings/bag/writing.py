@@ -123,11 +123,12 @@ class SetWriter:
 
     def _add(self, leaving: _Leaving, match: Match, now: int) -> None:
         common, number, bundle = match.stamp, next(leaving.numbers), 0
-        contents: list[bytes | None] = []
+        contents: list[bytes] = []
         values: list[int] = []
-        for message, (members, sent) in zip(match.messages, leaving.sources, strict=True):
+        missing: list[int] = []
+        for index, (message, (members, sent)) in enumerate(zip(match.messages, leaving.sources, strict=True)):
             if message is None:
-                contents.append(None)
+                missing.append(index)
                 continue
             channel, received, payload = message.payload
             written, is_as_matched = members[channel]
@@ -138,19 +139,16 @@ class SetWriter:
         if leaving.bundles is not None:
             bundle = number
             channels.append(leaving.bundles.output.channel)
-            payloads.append(self._bundled(leaving.bundles, match, contents, number))
+            payloads.append(_bundled(leaving.bundles, match, contents, number))
         if leaving.channels:
-            there = [content for content in contents if content is not None]
-            payloads += there
-            self._size += sum(map(len, there))
-            rows = zip(leaving.channels, contents, strict=True)
-            channels += [channel for channel, content in rows if content is not None]
+            payloads += contents
+            self._size += sum(map(len, contents))
+            channels += [each for index, each in enumerate(leaving.channels) if index not in missing]
         elif bundle:
             self._size += len(payloads[-1])
             values[3::4] = [number] * (len(values) // 4)
         if leaving.manifests is not None:
-            missing = tuple([index for index, content in enumerate(contents) if content is None])
-            note = Note(number, now - max(values[2::4]), common, values, missing, {}, bundle)
+            note = Note(number, now - max(values[2::4]), common, values, tuple(missing), {}, bundle)
             leaving.noted.append((len(payloads), note))
             channels.append(leaving.manifests.output.channel)
             payloads.append(b"")
@@ -170,12 +168,6 @@ class SetWriter:
         self._recording.write_all(self._channels, self._payloads, self._times)
         self.messages += len(self._payloads)
         self._channels, self._payloads, self._times, self._size = [], [], [], 0
-
-    def _bundled(self, bundles: _Bundles, match: Match, contents: Sequence[bytes | None], number: int) -> bytes:
-        try:
-            return bundles.bundle.content(contents, match.stamps, match.stamp, number)
-        except UnfitError as error:
-            raise BagError(f"{bundles.output.topic}: {error}") from error
 
     def _manifests(self, binding: GroupBinding) -> _Manifests:
         node = binding.group.inputs.node
@@ -204,6 +196,15 @@ class SetWriter:
 def _profile(each: Input) -> Profile:
     """Return what an input's messages leave with."""
     return matched(each.config.qos, [profile for channel in each.channels for profile in channel.qos])
+
+
+def _bundled(bundles: _Bundles, match: Match, contents: Sequence[bytes], number: int) -> bytes:
+    there = iter(contents)
+    each = [None if message is None else next(there) for message in match.messages]
+    try:
+        return bundles.bundle.content(each, match.stamps, match.stamp, number)
+    except UnfitError as error:
+        raise BagError(f"{bundles.output.topic}: {error}") from error
 
 
 def _members(group: GroupConfig, each: Input) -> dict[Channel, _Member]:
