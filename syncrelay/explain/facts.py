@@ -7,7 +7,7 @@ from typing import Final, NamedTuple, TypedDict
 from syncrelay.clock import Step
 from syncrelay.config import Distance, Tolerance, TransformsConfig
 from syncrelay.explain.figures import GroupFigures, InputFigures
-from syncrelay.explain.graph_facts import BundleGraph, GraphSnapshot, InputGraph
+from syncrelay.explain.graph_facts import BundleGraph, Endpoint, GraphSnapshot, InputGraph
 from syncrelay.explain.standing import Standing
 from syncrelay.explain.suggester import Suggester
 from syncrelay.explain.unneeded import DropFates, drop_fates, may_set_pace
@@ -141,6 +141,7 @@ class Around(TypedDict, total=False):
     is_look: bool
     inactive: str | None
     lapses: Sequence[Lapse]
+    unheard: Sequence[tuple[str, Endpoint]]
     bundle: BundleGraph | None
 
 
@@ -206,6 +207,8 @@ class GroupFacts:
     """The transforms for which its sets wait."""
     lapses: Sequence[Lapse] = ()
     """The last sets that were given up because they could not be transformed."""
+    unheard: Sequence[tuple[str, Endpoint]] = ()
+    """The publishers of transforms that do not offer what tf2 requests, with their topics."""
     inactive: str | None = None
     """The name of a managed node that waits to be activated."""
     bundle: BundleGraph | None = None

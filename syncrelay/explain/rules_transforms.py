@@ -32,6 +32,11 @@ def no_transform(facts: GroupFacts) -> Found:
     last = lapses[-1]
     an_input = facts.inputs[last.input]
     text, cure = _told(last.missing, an_input, covered, facts)
+    for topic, publisher in facts.unheard:
+        if (why := publisher.mismatch) is not None and last.missing.lack is not Lack.NO_FRAME:
+            node = publisher.node
+            text = f"{text}, and {node} offers {topic} with {why.policy} {why.offered}, tf2 requests {why.requested}"
+            cure = f"have {node} offer {why.requested}"
     sets = f"{counted(dropped, 'set')} {'was' if dropped == 1 else 'were'}"
     yield Fault(
         f"{text}: {sets} dropped as no_transform in the last 10 s",

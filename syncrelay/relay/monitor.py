@@ -217,6 +217,7 @@ class Monitor:
             empty_graph=None if all(each.publishers for each in shown) else self._empty_graph,
             inactive=self.inactive,
             lapses=batch.lapses,
+            unheard=self._surroundings.unheard() if batch.lapses else (),
             bundle=self._surroundings.bundle_of(binding),
         )
         found = judge.judge(facts)

@@ -13,6 +13,7 @@ from syncrelay.relay.bindings import GroupBinding
 from syncrelay.relay.inputs import InputBinding
 from syncrelay.relay.outputs import BundleOutput
 from syncrelay.relay.ports import EndpointInfo, Node, Publisher, Purpose
+from syncrelay.relay.transforms import PROFILES
 from syncrelay.runtime import Runtime
 
 
@@ -39,6 +40,7 @@ class Surroundings:
         self._rivals_since: dict[InputBinding | BundleOutput, int] = {}
         self._managed: dict[InputBinding, tuple[str, ...]] = {}
         self._managed_nodes: dict[str, bool] | None = None
+        self._unheard: tuple[tuple[str, Endpoint], ...] | None = None
         self._relayed: dict[str, bool] = {}
         self._published: dict[str, tuple[tuple[str, ...], Sequence[EndpointInfo]]] | None = None
 
@@ -53,7 +55,7 @@ class Surroundings:
         """Poll the graph again for each, as it has changed."""
         self._around.clear()
         self._alike.clear()
-        self._managed_nodes = None
+        self._managed_nodes = self._unheard = None
         self._relayed.clear()
         self._published = None
 
@@ -144,6 +146,17 @@ class Surroundings:
         if name not in self._relayed:
             self._relayed[name] = any(graph.is_relayed(self._graph, each, name) for each in publishers)
         return self._relayed[name]
+
+    def unheard(self) -> Sequence[tuple[str, Endpoint]]:
+        """Return the publishers of transforms that do not offer what tf2 requests, with their topics."""
+        if self._unheard is None:
+            self._unheard = tuple(
+                (topic, each)
+                for topic, profile in PROFILES.items()
+                for each in graph.as_publishers(self._graph.publishers_of(self._node.resolve_topic(topic)), profile)
+                if each.mismatch is not None
+            )
+        return self._unheard
 
     def bundle_of(self, binding: GroupBinding) -> BundleGraph | None:
         """Return what there is around the topic of the bundles of a group, if it has them."""

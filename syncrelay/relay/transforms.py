@@ -19,10 +19,11 @@ from syncrelay.relay.types import import_type
 from syncrelay.runtime import Runtime
 
 # As tf2_ros::TransformListener subscribes: a consumer would get no others.
-_PROFILES: Final = {
+PROFILES: Final = {
     "/tf": Profile(depth=100),
     "/tf_static": Profile(depth=100, durability="transient_local"),
 }
+"""The topics of transforms, and what is requested of their publishers."""
 # What DDS refuses is tried again this often.
 _TRY_AGAIN_S: Final = 5.0
 
@@ -72,13 +73,13 @@ class TransformListener:
             if self._message_type is None or topic in self._failed:
                 self._leave(topic)
         if self._message_type is not None and self._runtime.monotonic() >= self._try_again:
-            for topic in _PROFILES:
+            for topic in PROFILES:
                 if topic not in self._entered:
                     self._enter(topic)
 
     def _enter(self, topic: str) -> None:
         try:
-            subscription = self._entities.subscription(self._message_type, topic, _PROFILES[topic])
+            subscription = self._entities.subscription(self._message_type, topic, PROFILES[topic])
             try:
                 deliver = partial(self._take, is_static=topic == "/tf_static")
                 source = self._backend.source(subscription, deliver)

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from syncrelay.config import TransformsConfig
-from syncrelay.explain import Code
+from syncrelay.explain import Code, Endpoint, Mismatch
 from syncrelay.sync import DropReason, Lack, Lapse, Missing
 from tests.explain.support.cases import LIDAR, camera, dropped
 from tests.explain.support.groups import MS, S, a_group, a_silent_group
@@ -36,6 +36,12 @@ FOUND = {
     ),
     "a transform that began after the message": given_up(Lack.PAST, by=300 * MS, count=1, group=a_silent_group),
     "a frame that no transform names": given_up(Lack.UNKNOWN_FRAME, parent="base_link", child="camera_lens"),
+    "a frame whose publisher does not offer what tf2 requests": given_up(
+        Lack.UNKNOWN_FRAME,
+        parent="base_link",
+        child="camera_lens",
+        unheard=[("/tf_static", Endpoint("/urdf", "", Mismatch("durability", "volatile", "transient_local")))],
+    ),
     "a target that no transform names": given_up(Lack.UNKNOWN_FRAME, parent="base_link", child="base_link"),
     "two trees": given_up(Lack.UNCONNECTED, parent="base_link", child="camera_lens"),
     "a loop of transforms": given_up(Lack.LOOP, parent="base_link", child="odom"),
