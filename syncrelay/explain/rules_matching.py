@@ -65,12 +65,11 @@ def over_slop(facts: GroupFacts) -> Found:
     if next(other_clock(facts), None):
         return
     gives_few = facts.has_stopped or facts.standing is Standing.FEW
+    severity = Severity.ERROR if facts.is_silent else Severity.WARN
     if gives_few and (narrow := over_tolerances(facts)) is not None:
-        severity = Severity.ERROR if facts.is_silent else Severity.WARN
         yield Fault(narrow, _tolerance_advice(facts, REQUIRED), severity)
         return
     if facts.has_stopped and nearest.share_over(tolerance.ns) > 1 - _MISSED:
-        severity = Severity.ERROR if facts.is_silent else Severity.WARN
         text = _too_wide(facts, tolerance, nearest)
     elif _is_often_over(facts, tolerance, nearest):
         text, severity = _often_too_wide(facts, tolerance, nearest), Severity.WARN
@@ -80,6 +79,10 @@ def over_slop(facts: GroupFacts) -> Found:
     check = "check how these topics are stamped, and whether messages are missing"
     if len(nearest) < _FEWEST:
         check = "wait for some more messages: it is not known yet what would help"
+    paused = {_longest_pause(each, 0): each for each in facts.inputs if not each.figures.bursts}
+    if severity is Severity.WARN and (pause := max(paused, default=0)):
+        text += f"; {paused[pause].name} paused for up to {words.duration(pause)}"
+        check = f"check {nodes(paused[pause])}, and the network to it"
     coarse = {each.name: unit for each in facts.inputs if (unit := each.figures.resolution) > tolerance.ns}
     if 0 < len(coarse) < len(facts.inputs):
         text += "".join(f"; stamps of {name} are multiples of {words.duration(unit)}" for name, unit in coarse.items())
@@ -329,10 +332,7 @@ def few_sets(facts: GroupFacts) -> Found:
 
 
 def _longest_pause(an_input: InputFacts, absent: int) -> int:
-    """Return the longest pause of an input, in nanoseconds, if most of so many absent messages fell into pauses; or 0.
-
-    A pause is as long as several usual periods: messages that are lost one by one seldom leave one.
-    """
+    """Return an input's longest pause, in nanoseconds, if most of so many absent messages fell into pauses; or 0."""
     figures = an_input.figures
     if not figures.gaps:
         return 0

@@ -99,6 +99,11 @@ FOUND = {
     "few sets of an input that pauses": a_group(
         camera(), LIDAR, figures={"share": Share(60, 100, 10 * S, 0, absent=40)}, **FEW
     ),
+    "sets that are often too wide for an input that pauses": a_group(
+        camera(figures={"received": tuple(NOW - n * 100 * MS for n in (50, 49, 19, *range(18, -1, -1)))}),
+        LIDAR,
+        figures={"nearest": Distribution([3 * MS] * 60 + [500 * MS] * 30 + [3 * MS] * 10)},
+    ),
     "few sets of a trigger, told by its own messages": a_group(
         an_input("/map", figures={"rate_hz": 1.0}),
         dropped(DropReason.EXPIRED, 60),
