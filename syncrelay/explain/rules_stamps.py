@@ -133,7 +133,7 @@ def other_clock(facts: GroupFacts) -> Found:
             f"stamps of {an_input.name}{shifted} are {words.behind(behind)} those of {whose}"
             f"{f': they {scale.what}' if scale else ''}"
         )
-        text += "" if facts.has_stopped else ": sets hold messages of different moments"
+        text += "" if facts.has_stopped else ": any set of these holds messages of different moments"
         by = behind if scale is None else scale.behind
         mapped = _or_mapped(facts, index, None if by is None else by + offset)
         right = _to_the_usual_time(facts, an_input, scale)
