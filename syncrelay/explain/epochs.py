@@ -116,9 +116,9 @@ def time_scale(newest: int, behind: int) -> TimeScale | None:
 
 
 def usual_delay(delays: Collection[int]) -> int:
-    """Return the delay of an input whose stamps are of the usual time: that of most clocks, ours among them.
+    """Return the delay of an input whose stamps are of the usual time: that of most clocks.
 
-    Ours says 0: of as many that agree with it as do not, it decides.
+    This machine's clock counts as one more, with a delay of 0: where two times are as usual, its own is right.
     """
     clocks = [*delays, 0]
     usual = min(median_low(clocks), median_high(clocks), key=abs)

@@ -15,7 +15,6 @@ from syncrelay.explain.figures import InputFigures
 from syncrelay.explain.findings import written
 from syncrelay.explain.nearest import Nanoseconds, period_of, quantile, shifted, sides
 from syncrelay.explain.pairing import is_certain
-from syncrelay.explain.received import Received
 from syncrelay.explain.trials import REQUIRED, UNTRIED, Trials, Tried, Verdict
 from syncrelay.explain.widths import with_headroom
 
@@ -241,7 +240,7 @@ def _mapped_stamps(trials: Trials, index: int) -> Nanoseconds | None:
 
 def _with_stamps(trials: Trials, index: int, stamps: Nanoseconds, changes: Changes) -> Trials:
     """Return trials of the same messages with other stamps of an input, of the group with changes."""
-    own = Received(stamps, trials.inputs[index].received, trials.inputs[index].places)
+    own = replace(trials.inputs[index], stamps=stamps, ordered={})
     inputs = [own if at == index else each for at, each in enumerate(trials.inputs)]
 
     # As in a window: what the mapping costs until it has settled is not held against it.

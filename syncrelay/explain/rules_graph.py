@@ -185,7 +185,7 @@ def _never_published(facts: GroupFacts, missing: Sequence[InputFacts]) -> tuple[
 def _or_configure(an_input: InputFacts) -> str:
     if not (managed := an_input.graph.managed):
         return ""
-    some = all_of(managed) if len(managed) <= _FEW else f"{len(managed)} managed nodes, as {managed[0]},"
+    some = all_of(managed) if len(managed) <= _FEW else f"{len(managed)} managed nodes, such as {managed[0]},"
     verb = "publishes" if len(managed) == 1 else "publish"
     return (
         f"; {some} {verb} nothing yet, and may have to be configured and activated: `ros2 lifecycle get {managed[0]}`"
@@ -360,15 +360,11 @@ def _is_enough(facts: GroupFacts, an_input: InputFacts, quiet: int) -> bool:
 
 
 def _or_hold_longer(facts: GroupFacts, index: int) -> str:
-    tolerance, rarely = facts.tolerance_of(index), "; if it is meant to be sent this rarely, write"
+    rarely = "; if it is meant to be sent this rarely, write"
     if facts.is_held(index):
-        return (
-            ""
-            if tolerance is None
-            else f"{rarely} a `{tolerance.key}` larger than {words.duration(tolerance.ns)} for it"
-        )
-    is_trigger = index == facts.trigger or not facts.by_stamp
+        tolerance = facts.tolerance_of(index)
+        key = tolerance and f"a `{tolerance.key}` larger than {words.duration(tolerance.ns)} for it"
+        return f"{rarely} {key}" if key else ""
     # What has ever had a rate has died.
-    return (
-        "" if is_trigger or facts.inputs[index].figures.usual_hz else f"{rarely} `policy: latest_time`, which holds it"
-    )
+    may_be_held = facts.by_stamp and index != facts.trigger and not facts.inputs[index].figures.usual_hz
+    return f"{rarely} `policy: latest_time`, which holds it" if may_be_held else ""

@@ -79,7 +79,8 @@ def over_slop(facts: GroupFacts) -> Found:
     check = "check how these topics are stamped, and whether messages are missing"
     if len(nearest) < _FEWEST:
         check = "wait for some more messages: it is not known yet what would help"
-    paused = {_longest_pause(each, 0): each for each in facts.inputs if not each.figures.bursts}
+    were_wide = round(nearest.share_over(tolerance.ns) * len(nearest))
+    paused = {_longest_pause(each, were_wide): each for each in facts.inputs if not each.figures.bursts}
     if severity is Severity.WARN and (pause := max(paused, default=0)):
         text += f"; {paused[pause].name} paused for up to {words.duration(pause)}"
         check = f"check {nodes(paused[pause])}, and the network to it"

@@ -124,6 +124,7 @@ def other_clock(facts: GroupFacts) -> Found:
         off = {index: behind for index, behind in off.items() if known[index] < -_AHEAD}
     usually = [facts.inputs[index].name for index in known if index not in off]
     whose = "the other inputs" if len(off) == 1 < len(usually) else all_of(usually)
+    # The farthest first; of those of one clock, whose delays differ by less than a second, the first of the file.
     for index, behind in sorted(off.items(), key=lambda each: -abs(each[1]) // SECOND):
         an_input, offset = facts.inputs[index], facts.inputs[index].offset
         shifted = f", with its offset of {words.exactly(offset)}," if offset else ""

@@ -112,8 +112,10 @@ def managed_nodes(node: Node) -> dict[str, bool]:
     found = {}
     for name in names:
         namespace, _, own = name.rpartition("/")
-        published = node.graph.published_by(NodeName(own, namespace or "/"))
-        found[name] = published.keys() <= {*_OF_EVERY_NODE, f"{name}{_STATE}"}
+        published = node.graph.published_by(NodeName(own, namespace or "/")).keys()
+        # The player of a recording publishes the states of nodes that are not here.
+        if f"{name}{_STATE}" in published:
+            found[name] = published <= {*_OF_EVERY_NODE, f"{name}{_STATE}"}
     found.pop(node.name, None)
     return found
 

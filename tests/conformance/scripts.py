@@ -306,6 +306,8 @@ _GRAPH: Final = (
         do.endpoints("/camera/imago", publishers=1), do.finding("no_publisher")),
     long("a managed node that publishes nothing yet, and sends nothing until it is active",
         do.publisher("/driver/transition_event", of=EVENT, by="driver", node="driver"), do.publisher("/b"),
+        # As the player of a recording does, of a node that is not here.
+        do.publisher("/ghost/transition_event", of=EVENT, by="player", node="player"),
         do.relay(PAIR), do.finding("no_publisher", naming="/driver publishes nothing yet"),
         do.publisher("/a", by="driver", node="driver"), do.finding("silent", naming="ros2 lifecycle get /driver")),
 )

@@ -4,10 +4,11 @@ import pytest
 
 from syncrelay.explain import ClockState, Code, Finding, Severity, explanation, judge, with_ok
 from syncrelay.explain.causes import EXPLAINS, explained_by
+from syncrelay.explain.distribution import Distribution
 from syncrelay.sync.messages import DropReason
 from tests.explain.support import cases_flow, cases_graph, cases_stamps, cases_transforms
 from tests.explain.support.cases import LIDAR, QUIET, STRANGER, UNFIT, camera, fed, said_of_cases, wide
-from tests.explain.support.groups import NOW, S, a_group, a_silent_group, an_input
+from tests.explain.support.groups import MS, NOW, S, a_group, a_silent_group, an_input
 
 FOUND = cases_graph.FOUND | cases_stamps.FOUND | cases_flow.FOUND | cases_transforms.FOUND
 QUIETLY = [
@@ -108,3 +109,11 @@ def test_a_relay_that_waited_briefly_explains_no_long_silence():
     found = judge(a_silent_group(quiet, LIDAR, figures=wide(*[30] * 9), waited=S))
     assert {each.code for each in found} == {Code.TOO_SLOW, Code.SILENT}
     assert explanation(found).code is Code.SILENT
+
+
+def test_a_pause_of_fewer_messages_than_were_too_wide_is_not_why():
+    late = camera(figures={"received": tuple(NOW - n * 100 * MS for n in (33, 32, 26, *range(25, -1, -1)))})
+    wide_sets = {"nearest": Distribution([3 * MS] * 60 + [500 * MS] * 30 + [3 * MS] * 10)}
+    found = explanation(judge(a_group(late, LIDAR, figures=wide_sets)))
+    assert found.code is Code.OVER_SLOP
+    assert "paused" not in found.text
