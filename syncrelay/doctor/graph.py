@@ -6,14 +6,13 @@ from typing import Final
 from syncrelay.config.wording import all_of
 from syncrelay.doctor.diagnosis import Diagnosis, Severity, error, info
 from syncrelay.environment.domain import ports_of
-from syncrelay.explain import Code, Finding, GraphSnapshot, GroupReport, no_other_node
+from syncrelay.explain import RUN_DOCTOR, Code, Finding, GraphSnapshot, GroupReport, no_other_node
 from syncrelay.explain import Severity as Judged
 
 _SEVERITIES: Final = {Judged.WARN: Severity.WARNING, Judged.ERROR: Severity.ERROR}
-# Advice of the relay that leads here, and what it leads to.
-_HERE: Final = "if so, run `syncrelay doctor --config FILE --live`"
+# In place of the end of advice that leads here.
 _NEXT: Final = (
-    "on its own machine, in its own container and as its own user;\nif so, messages get lost on the way: export"
+    ", on its own machine, in its own container and as its own user;\nif so, messages get lost on the way: export"
     " FASTDDS_BUILTIN_TRANSPORTS=UDPv4 on both sides, and restart both"
 )
 _AGAIN: Final = "run it again with a larger --seconds"
@@ -138,9 +137,7 @@ def _diagnosis(shared: Sequence[tuple[GroupReport, Finding]]) -> Diagnosis:
         _SEVERITIES.get(finding.severity, Severity.WARNING),
         f"{names}: {finding.text}",
         f"no sets from {names}" if is_fatal else None,
-        _AGAIN
-        if finding.code is Code.STARTING
-        else (finding.suggestion or "").replace(f"; {_HERE}", f", {_NEXT}") or None,
+        _AGAIN if finding.code is Code.STARTING else (finding.suggestion or "").replace(RUN_DOCTOR, _NEXT) or None,
     )
 
 

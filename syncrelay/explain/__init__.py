@@ -20,7 +20,7 @@ from syncrelay.explain.judge import Judge, explanation, judge, with_ok
 from syncrelay.explain.lines import GroupLines
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet
-from syncrelay.explain.rules_graph import no_other_node
+from syncrelay.explain.rules_graph import RUN_DOCTOR, no_other_node
 from syncrelay.explain.standing import NO_SET_MISSED, Share, Standing
 from syncrelay.explain.steps import STEP_NS
 from syncrelay.explain.tape import Left, Stamps, Tape
@@ -33,6 +33,7 @@ __all__ = [
     "BOUNDS_NS",
     "FOR_WANT_OF_A_PARTNER",
     "NO_SET_MISSED",
+    "RUN_DOCTOR",
     "STEP_NS",
     "UNREADABLE",
     "Arrivals",

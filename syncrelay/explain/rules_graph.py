@@ -28,6 +28,9 @@ _FEW: Final = 3
 # A pause is reported if it is this many times the longest before.
 _PAUSES: Final = 3
 
+RUN_DOCTOR: Final = "; if so, run `syncrelay doctor --config FILE --live`"
+"""How advice ends that leads to the doctor, who says in place of it what is next."""
+
 
 def internal_error(facts: GroupFacts) -> Found:
     """Find that an exception has stopped the group."""
@@ -306,8 +309,7 @@ def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Fault | None
         lately = " lately" if an_input.counts.fed else ""
         return Fault(
             f"{node} publishes {an_input.name}, but no message has arrived{lately}",
-            f"{state}check with `ros2 topic hz {an_input.name}` whether {node} is sending; if so,"
-            " run `syncrelay doctor --config FILE --live`",
+            f"{state}check with `ros2 topic hz {an_input.name}` whether {node} is sending{RUN_DOCTOR}",
             absence(facts, an_input),
             input=index,
         )
@@ -365,6 +367,9 @@ def _or_hold_longer(facts: GroupFacts, index: int) -> str:
         tolerance = facts.tolerance_of(index)
         key = tolerance and f"a `{tolerance.key}` larger than {words.duration(tolerance.ns)} for it"
         return f"{rarely} {key}" if key else ""
+    others = [each for at, each in enumerate(facts.inputs) if at != index]
     # What has ever had a rate has died.
-    may_be_held = facts.by_stamp and index != facts.trigger and not facts.inputs[index].figures.usual_hz
-    return f"{rarely} `policy: latest_time`, which holds it" if may_be_held else ""
+    if not others or not facts.by_stamp or index == facts.trigger or facts.inputs[index].figures.usual_hz:
+        return ""
+    trigger = max(others, key=lambda each: each.figures.rate_hz)
+    return f"{rarely} `policy: latest_time` and `trigger: {trigger.name}`, so that its last message is held"
