@@ -1,7 +1,8 @@
 """rclpy's own raw take and publish: payloads are bytes, copied in and out."""
 
 import time
-from typing import Any
+from threading import Event
+from typing import Any, Final
 
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -12,6 +13,9 @@ from syncrelay.dataflow.deliveries import Tally
 from syncrelay.dataflow.flow import Flow
 from syncrelay.dataflow.inbox import PolledInbox
 from syncrelay.ros.entities import has_subscriber
+
+# rmw_fastrtps takes some triggers of a guard condition for none, one in some ten thousand: they are seen by then.
+_LONGEST_NS: Final = 1_000_000_000
 
 
 class RclpyPayload:
@@ -87,6 +91,7 @@ class WaitSetWatch:
         self._context = context
         self._sources: list[RclpySource] = []
         self._wait_set: Any = None
+        self._woken = Event()
         self._guard = GuardCondition(callback=None, callback_group=None, context=context)
 
     def add(self, source: RclpySource) -> None:
@@ -100,7 +105,7 @@ class WaitSetWatch:
         self._wait_set = None
 
     def wait(self, timeout_ns: int) -> Ready:
-        """Wait until a source has messages, for the timeout at most, or until a wake."""
+        """Wait until a source has messages, for the timeout or a second at most, or until a wake."""
         if self._wait_set is None:
             self._wait_set = _rclpy.WaitSet(len(self._sources), 1, 0, 0, 0, 0, self._context.handle)
         wait_set = self._wait_set
@@ -111,14 +116,17 @@ class WaitSetWatch:
             wait_set.add_subscription(source.handle)
         # If messages come for several sources while it waits, it may see only one of them; the next poll sees all.
         seen_until = time.time_ns()
-        wait_set.wait(timeout_ns)
+        wait_set.wait(min(timeout_ns, _LONGEST_NS))
         ready = [source for index, source in enumerate(self._sources) if wait_set.is_ready("subscription", index)]
         for source in ready:
             source.pending = ALL
-        return ready, seen_until, wait_set.is_ready("guard_condition", 0)
+        if woken := self._woken.is_set():
+            self._woken.clear()
+        return ready, seen_until, woken
 
     def wake(self) -> None:
         """Have `wait` return. Any thread."""
+        self._woken.set()
         self._guard.trigger()
 
     def close(self) -> None:

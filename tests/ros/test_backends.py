@@ -21,6 +21,7 @@ from tests.ros.streams import BEGIN
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from geometry_msgs.msg import Vector3Stamped
+from rclpy.guard_condition import GuardCondition
 from rclpy.qos import QoSProfile
 
 from syncrelay.ros import backend_choice
@@ -165,6 +166,14 @@ def test_no_message_and_no_wake_is_missed(here):
             wait_until(lambda turns=turns: thread.turns > turns, "the wake", poll_s=_SOON_S)
     wait_until(lambda: len(came) == 3000, "all messages")
     thread.end()
+    inbox.close()
+
+
+def test_a_wake_that_the_middleware_takes_for_none_ends_a_wait_all_the_same(here, monkeypatch):
+    monkeypatch.setattr(GuardCondition, "trigger", lambda _: None)
+    inbox = here.backend.inbox()
+    inbox.wake()
+    inbox.receive(_NEVER)
     inbox.close()
 
 
