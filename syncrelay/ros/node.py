@@ -1,6 +1,7 @@
 """A node of rclpy, as the relay's ports want it."""
 
 import logging
+import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, Final
@@ -33,6 +34,7 @@ _ROSOUT: Final = ("/rosout", "rcl_interfaces/msg/Log")
 # A clock may fall back by this much without a jump: two publishers of /clock, or one that rounds.
 _JUMP: Final = Duration(nanoseconds=-1_000_000_000)
 _FORWARD: Final = Duration(nanoseconds=1)
+_WAKE_AGAIN_S: Final = 0.1
 
 
 class _LeftToTheReceiveLoop(CallbackGroup):  # type: ignore[misc]  # CallbackGroup is untyped
@@ -67,6 +69,8 @@ class RosNode:
         self._executor = SingleThreadedExecutor(context=raw.context)
         self._executor.add_node(raw)
         self._served = RosFuture()
+        self._rests = threading.Event()
+        self._rests.set()
         self._answering = Answering(raw)
         for subscription in raw.subscriptions:
             # rclpy's own, which is there from the start where time is simulated.
@@ -163,11 +167,18 @@ class RosNode:
 
     def serve(self) -> None:
         if self.raw.context.ok():
-            with suppress(ExternalShutdownException):
-                self._executor.spin_until_future_complete(self._served)
+            self._rests.clear()
+            try:
+                with suppress(ExternalShutdownException):
+                    self._executor.spin_until_future_complete(self._served)
+            finally:
+                self._rests.set()
 
     def end_serving(self) -> None:
         self._served.set_result(None)
+        # The middleware takes a wake for none now and then, see rclpy_backend, and the executor would wait for ever.
+        while not self._rests.wait(_WAKE_AGAIN_S):
+            self._executor.wake()
 
     def leave(self) -> None:
         self._executor.shutdown()

@@ -69,6 +69,21 @@ def test_it_ends_where_its_executor_was_about_to_wait(stage: Stage):
     assert relay.wait() == 0
 
 
+# A wake that the middleware takes for none: the end of serving wakes nobody.
+_WAKES_NOBODY = """\
+from rclpy.task import Future
+Future.add_done_callback = lambda *_: None
+"""
+
+
+def test_it_ends_where_the_executor_is_not_woken(stage: Stage):
+    stage.before_each_relay(_WAKES_NOBODY)
+    relay = stage.relay(config({"front": _FRONT}))
+    relay.wait_for_log("front: waiting for")
+    relay.send(signal.SIGTERM)
+    assert relay.wait() == 0
+
+
 # rcl's last call, as Fast DDS hangs in it.
 _HANGS_IN_DDS = """\
 import time
